@@ -1,0 +1,17 @@
+#version 460
+#include "shared/kernel.glsl"
+
+/// One thread: what was filled in becomes ready, counted, and turned into indirect dispatch arguments; filling starts anew.
+void main() {
+    if (gl_GlobalInvocationID.x != 0u)
+        return;
+    for (uint queue = 0u; queue < QUEUES; queue++) {
+        if ((step_now.queues & (1u << queue)) == 0u)
+            continue;
+        uint items = counters[COUNTER_FILLING + queue];
+        counters[COUNTER_FILLING + queue] = 0u;
+        counters[COUNTER_READY + queue] = items;
+        counters[COUNTER_TOTAL + queue] += items;
+        dispatches[queue] = Dispatch((items + WORKGROUP - 1u) / WORKGROUP, 1u, 1u);
+    }
+}

@@ -1,0 +1,47 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/queue.glsl"
+#include "shared/random.glsl"
+#include "shared/intersect.glsl"
+#include "shared/traverse.glsl"
+#include "shared/light.glsl"
+#include "shared/pixel.glsl"
+
+/// Workgroups take even tiles first, then odd ones: software Vulkan gives each thread one contiguous half of the grid,
+/// and so both get their share of every part of the picture.
+uint interleaved_workgroup() {
+    uint half_count = (gl_NumWorkGroups.x + 1u) / 2u;
+    uint id = gl_WorkGroupID.x;
+    return id < half_count ? 2u * id : 2u * (id - half_count) + 1u;
+}
+
+/// The ray through a point of the picture, in pixels from the upper left corner.
+Ray camera_ray(vec2 point) {
+    vec2 plane = vec2(point.x / float(frame.width) * 2.0 - 1.0, 1.0 - point.y / float(frame.height) * 2.0);
+    vec3 offset = frame.right * plane.x + frame.up * plane.y;
+    return frame.orthographic != 0u ? Ray(frame.eye + offset, frame.forward)
+                                    : Ray(frame.eye, normalize(frame.forward + offset));
+}
+
+/// One thread a pixel sample: camera ray → nearest hit → hit queue, or background.
+void main() {
+    uint sample_index = interleaved_workgroup() * WORKGROUP + gl_LocalInvocationIndex;
+    uint pixel = sample_index / step_now.samples;
+    if (pixel >= step_now.pixels)
+        return;
+    uvec2 place = pixel_place(step_now.first_pixel + pixel);
+    if (place.x >= frame.width || place.y >= frame.height)
+        return;
+    vec2 inside = vec2(0.5);
+    if (MULTISAMPLING)
+        inside = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_index % step_now.samples);
+
+    Ray ray = camera_ray(vec2(place) + inside);
+    Hit hit = nearest_hit(ray);
+    if (hit.triangle == NO_TRIANGLE) {
+        radiance[sample_index] = vec4(background(ray.direction), frame.background_alpha);
+        return;
+    }
+    radiance[sample_index] = vec4(0.0, 0.0, 0.0, 1.0);
+    hit_queue[queue_append(QUEUE_HIT)] = HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, vec3(1.0));
+}

@@ -1,0 +1,17 @@
+// What a scene may need. Each is a specialization constant, so that code which is switched off is never compiled; the
+// host neither allocates its buffers nor records its passes. Switching one on that is not needed changes no pixel.
+
+/// Some triangles have vertex normals.
+layout(constant_id = 0) const bool SMOOTH_NORMALS = true;
+/// Some triangles have vertex colours.
+layout(constant_id = 1) const bool VERTEX_COLORS = true;
+/// Some triangles are seen from the front only.
+layout(constant_id = 2) const bool SINGLE_SIDED = true;
+/// Some material has a specular coefficient and some light shines.
+layout(constant_id = 3) const bool SPECULAR = true;
+/// Some light shines on some material that answers it: the shadow pass.
+layout(constant_id = 4) const bool SHADOWS = true;
+/// Some material mirrors and the maximum depth is above 0: the reflection pass.
+layout(constant_id = 5) const bool REFLECTIONS = true;
+/// More than one sample a pixel: stratified positions.
+layout(constant_id = 6) const bool MULTISAMPLING = true;

@@ -1,0 +1,71 @@
+// Ray against triangle, watertight: Woop, Benthin and Wald, JCGT 2(1) 2013. The world is sheared so that the ray runs
+// along z from the origin; then three 2D edge functions decide. Two triangles evaluate a shared edge by the same products,
+// exactly negated (`precise` forbids contraction), and 0 counts as inside: no ray slips between them.
+
+/// The triangle of a ray that hits none.
+const uint NO_TRIANGLE = 0xffffffffu;
+
+struct Ray {
+    vec3 origin;
+    vec3 direction;
+};
+
+struct Hit {
+    /// Distance along the ray, in lengths of its direction.
+    float t;
+    /// Triangle in leaf order.
+    uint triangle;
+    /// Primitive: decides between hits at the same distance, so that the tree's shape never shows.
+    uint primitive;
+    /// λ2, λ3.
+    vec2 barycentrics;
+};
+
+/// A ray prepared for the triangle test. Axes are rotated so that z is the direction's largest component.
+struct ShearedRay {
+    vec3 origin;
+    /// x/z, y/z and 1/z of the rotated direction.
+    vec3 shear;
+    uint largest_axis;
+};
+
+vec3 rotate_axes(vec3 v, uint largest_axis) {
+    return largest_axis == 0u ? v.yzx : largest_axis == 1u ? v.zxy : v;
+}
+
+ShearedRay shear_ray(Ray ray) {
+    vec3 size = abs(ray.direction);
+    uint axis = size.x >= size.y ? (size.x >= size.z ? 0u : 2u) : (size.y >= size.z ? 1u : 2u);
+    vec3 d = rotate_axes(ray.direction, axis);
+    return ShearedRay(ray.origin, vec3(d.x / d.z, d.y / d.z, 1.0 / d.z), axis);
+}
+
+/// Takes the triangle as the new hit if it is nearer than the old one.
+bool intersect_triangle(ShearedRay ray, uint triangle, bool culls, inout Hit hit) {
+    uint first = triangle * TRIANGLE_TEXELS;
+    uvec4 texel_a = FETCH(triangles, first);
+    uvec4 texel_b = FETCH(triangles, first + 1u);
+    uvec4 texel_c = FETCH(triangles, first + 2u);
+    vec3 a = rotate_axes(uintBitsToFloat(texel_a.xyz) - ray.origin, ray.largest_axis);
+    vec3 b = rotate_axes(uintBitsToFloat(texel_b.xyz) - ray.origin, ray.largest_axis);
+    vec3 c = rotate_axes(uintBitsToFloat(texel_c.xyz) - ray.origin, ray.largest_axis);
+
+    precise vec2 pa = a.xy - ray.shear.xy * a.z;
+    precise vec2 pb = b.xy - ray.shear.xy * b.z;
+    precise vec2 pc = c.xy - ray.shear.xy * c.z;
+    precise float u = pc.x * pb.y - pc.y * pb.x;
+    precise float v = pa.x * pc.y - pa.y * pc.x;
+    precise float w = pb.x * pa.y - pb.y * pa.x;
+    bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
+
+    float det = u + v + w;
+    precise float t = (u * a.z + v * b.z + w * c.z) * ray.shear.z / det;
+    // det and 1/z have the same sign when the ray meets the front face.
+    bool culled = culls && (texel_c.w & TRIANGLE_SINGLE_SIDED) != 0u && (det < 0.0) != (ray.shear.z < 0.0);
+    bool nearer = t < hit.t || (t == hit.t && texel_a.w < hit.primitive);
+    if (inside && det != 0.0 && t > 0.0 && nearer && !culled) {
+        hit = Hit(t, triangle, texel_a.w, vec2(v, w) / det);
+        return true;
+    }
+    return false;
+}

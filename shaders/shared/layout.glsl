@@ -1,0 +1,198 @@
+// THE CONTRACT: every struct and constant that crosses between host and device. build.rs translates this file to Rust
+// (src/layout); a line that it does not understand is a build error. All members are 4-byte scalars or vectors of them
+// under scalar block layout, so neither side has padding.
+
+/// Invocations in a workgroup of every kernel: one 8 × 8 tile of pixels.
+const uint WORKGROUP = 64u;
+/// Pixels along a side of a tile. Pixels are numbered tile by tile, row by row, in Morton order inside a tile.
+const uint TILE = 8u;
+/// Hard bound on the depth of the tree: the builder keeps it, the traversal's array stack relies on it.
+const uint MAX_TREE_DEPTH = 64u;
+/// Most triangles in a leaf that its 32-bit reference can name.
+const uint MAX_LEAF_TRIANGLES = 15u;
+/// Texels (16 bytes) in one tree node: a record for each of its two children.
+const uint NODE_TEXELS = 2u;
+/// Texels in one triangle of the traversal, and in one triangle's normals or colours.
+const uint TRIANGLE_TEXELS = 3u;
+
+/// Triangle flag: only the front face (counter-clockwise) is seen by camera and reflection rays.
+const uint TRIANGLE_SINGLE_SIDED = 1u;
+/// Triangle flag: it has vertex normals.
+const uint TRIANGLE_SMOOTH = 2u;
+/// Triangle flag: it has vertex colours.
+const uint TRIANGLE_COLORED = 4u;
+
+/// Queue of hits that wait to be shaded.
+const uint QUEUE_HIT = 0u;
+/// Queue of lights that wait for their shadow ray.
+const uint QUEUE_SHADOW = 1u;
+/// Queue of reflected rays that wait to be traced.
+const uint QUEUE_REFLECTION = 2u;
+/// Number of queues.
+const uint QUEUES = 3u;
+/// First counter of the items that wait in each queue while it is being filled.
+const uint COUNTER_FILLING = 0u;
+/// First counter of the items that the pass which empties each queue works on.
+const uint COUNTER_READY = 3u;
+/// First counter of the items that each queue has had in all.
+const uint COUNTER_TOTAL = 6u;
+/// Counter of rays whose traversal was cut short.
+const uint COUNTER_LOST = 9u;
+/// Number of counters.
+const uint COUNTERS = 10u;
+
+/// Light kind: all directions from a point.
+const uint LIGHT_POINT = 0u;
+/// Light kind: a cone from a point.
+const uint LIGHT_SPOT = 1u;
+/// Light kind: parallel light from infinitely far.
+const uint LIGHT_DIRECTIONAL = 2u;
+
+/// Distance that stands for infinity, in world units.
+const float FAR = 1e30;
+
+/// What is constant during a frame. World space is the scene's, moved so that its centre is the origin.
+struct Frame {
+    /// Camera position (perspective) or centre of its plane (orthographic).
+    vec3 eye;
+    /// Unit view direction.
+    vec3 forward;
+    /// Camera right, as long as half the picture is wide (at distance 1 for perspective).
+    vec3 right;
+    /// Camera up, as long as half the picture is high (at distance 1 for perspective).
+    vec3 up;
+    /// 1: parallel rays, 0: rays through the eye.
+    uint orthographic;
+    /// Picture width in pixels.
+    uint width;
+    /// Picture height in pixels.
+    uint height;
+    /// Tiles in a row.
+    uint tiles_across;
+    /// Samples a pixel: strata_x · strata_y.
+    uint samples;
+    /// Strata across a pixel.
+    uint strata_x;
+    /// Strata down a pixel.
+    uint strata_y;
+    /// Background radiance straight down.
+    vec3 nadir;
+    /// Background radiance straight up; equal to nadir for a constant background.
+    vec3 zenith;
+    /// Alpha of the background: 0 where it is transparent.
+    float background_alpha;
+    /// World position of quantised coordinate 0.
+    vec3 grid_origin;
+    /// Quanta per world unit.
+    vec3 grid_scale;
+};
+
+/// What changes from dispatch to dispatch: push constants.
+struct Step {
+    /// First pixel of the band, in tile order.
+    uint first_pixel;
+    /// Pixels in the band.
+    uint pixels;
+    /// First sample of each pixel in this wave.
+    uint first_sample;
+    /// Samples of each pixel in this wave.
+    uint samples;
+    /// shade: the light whose shadow rays are made.
+    uint light;
+    /// shade: 1 when this dispatch adds what needs no light and makes reflection rays (the first light's).
+    uint first_light;
+    /// shade: 1 while mirrors may still reflect.
+    uint reflect;
+    /// prepare: bit q set = queue q has been filled and is to be worked on.
+    uint queues;
+    /// resolve: 1 = divide by the number of samples, the band is complete.
+    uint finish;
+};
+
+/// Coefficients of Whitted's model: value = constant + tint · tinted, tint being the vertex colour (1 without).
+struct Material {
+    /// Radiance whatever the light.
+    vec3 ambient_tinted;
+    /// Radiance given off.
+    vec3 emission;
+    /// Lambert coefficient.
+    vec3 diffuse_tinted;
+    /// Blinn–Phong coefficient, part that tint leaves alone.
+    vec3 specular;
+    /// Blinn–Phong coefficient, part that tint multiplies.
+    vec3 specular_tinted;
+    /// Blinn–Phong exponent.
+    float shininess;
+    /// Mirror coefficient, part that tint leaves alone.
+    vec3 mirror;
+    /// Mirror coefficient, part that tint multiplies.
+    vec3 mirror_tinted;
+};
+
+/// A light (KHR_lights_punctual).
+struct Light {
+    /// LIGHT_POINT, LIGHT_SPOT or LIGHT_DIRECTIONAL.
+    uint kind;
+    /// World position; unused for directional.
+    vec3 position;
+    /// Unit direction in which light travels; unused for point.
+    vec3 direction;
+    /// Colour times intensity: candela, or lux for directional.
+    vec3 intensity;
+    /// Distance at which the light ends, FAR if it never does.
+    float range;
+    /// Cone falloff: clamp(cos·spot_scale + spot_offset)².
+    float spot_scale;
+    /// See spot_scale.
+    float spot_offset;
+};
+
+/// A hit to be shaded.
+struct HitItem {
+    /// Pixel sample, index into radiance.
+    uint sample_index;
+    /// Triangle, in leaf order.
+    uint triangle;
+    /// Barycentrics λ2, λ3; λ1 = 1 − λ2 − λ3.
+    vec2 barycentrics;
+    /// Unit direction of the ray that hit.
+    vec3 direction;
+    /// Product of the mirror coefficients on the way here.
+    vec3 throughput;
+};
+
+/// A light to be added where nothing blocks it.
+struct ShadowItem {
+    /// Pixel sample, index into radiance.
+    uint sample_index;
+    /// Start, off the surface.
+    vec3 origin;
+    /// Unit direction to the light.
+    vec3 direction;
+    /// Distance to the light.
+    float distance;
+    /// What the light adds if it is visible.
+    vec3 radiance;
+};
+
+/// A reflected ray to be traced.
+struct ReflectionItem {
+    /// Pixel sample, index into radiance.
+    uint sample_index;
+    /// Start, off the surface.
+    vec3 origin;
+    /// Unit direction.
+    vec3 direction;
+    /// Product of the mirror coefficients on the way here.
+    vec3 throughput;
+};
+
+/// Arguments of an indirect dispatch (VkDispatchIndirectCommand).
+struct Dispatch {
+    /// Workgroups.
+    uint x;
+    /// Always 1.
+    uint y;
+    /// Always 1.
+    uint z;
+};

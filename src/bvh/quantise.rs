@@ -1,0 +1,123 @@
+//! The tree as the kernels walk it: one 16-byte record a child, boxes as u16 on a grid over the whole scene.
+//!
+//! A record: `x = lo.x | lo.y << 16`, `y = lo.z | hi.x << 16`, `z = hi.y | hi.z << 16`, `w =` the child: an inner node's
+//! index, or `!(first << 4 | count)` for a leaf. Example: `lo = (1, 2, 3)`, `hi = (4, 5, 6)`, leaf of 3 from 10 on:
+//! `0x00020001 0x00040003 0x00060005 0xffffff5c`.
+//!
+//! Boxes are rounded outward, by more than the slab test's own error: about 4e-7 of the distance to the origin of the ray in
+//! quanta, so the further away a camera stands, the wider.
+
+use super::{Aabb, Bvh, Child};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Largest coordinate.
+const LAST: f64 = 65535.0;
+/// Slab error in quanta, for each quantum between ray origin and box: three roundings of 2⁻²⁴ and a reciprocal, doubled.
+const SLAB_ERROR: f64 = 8e-7;
+
+/// The grid: coordinate = (position − origin) · scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Position of coordinate 0.
+    pub origin: Vec3,
+    /// Quanta per world unit.
+    pub scale: Vec3,
+}
+
+/// A tree for the device.
+#[derive(Clone, Debug)]
+pub struct Quantised {
+    /// Two records a node.
+    pub records: Vec<[u32; 4]>,
+    /// Their grid.
+    pub grid: Grid,
+}
+
+impl Grid {
+    /// A grid over `bounds` with room for `margin` quanta around it.
+    fn over(bounds: &Aabb, margin: f64) -> Self {
+        let size = (bounds.hi - bounds.lo).max(Vec3::ZERO).as_dvec3();
+        // An axis without extent still needs a scale that is finite.
+        let size = size.max(DVec3::splat((size.max_element() * 1e-6).max(1e-30)));
+        let inner = LAST - 2.0 * margin.min(LAST / 4.0).ceil();
+        let scale = (DVec3::splat(inner) / size).as_vec3();
+        let origin = (bounds.lo.as_dvec3() - DVec3::splat(margin.min(LAST / 4.0).ceil()) / scale.as_dvec3()).as_vec3();
+        Self { origin, scale }
+    }
+
+    fn coordinate(&self, position: Vec3) -> DVec3 {
+        (position.as_dvec3() - self.origin.as_dvec3()) * self.scale.as_dvec3()
+    }
+}
+
+/// Quantises a tree for rays that start at most `reach` away from its centre (world units, per axis).
+pub fn quantise(bvh: &Bvh, reach: Vec3) -> Quantised {
+    let empty = bvh.order.is_empty();
+    let bounds = if empty { Aabb { lo: Vec3::ZERO, hi: Vec3::ZERO } } else { bvh.bounds };
+    let half = ((bounds.hi - bounds.lo) / 2.0).as_dvec3();
+    let reach = reach.as_dvec3().max(half);
+    // In quanta, as the slab test meets them: distance from the ray's origin to the far side of the grid.
+    let rough = Grid::over(&bounds, 1.0);
+    let margin = 0.05 + ((reach + half) * rough.scale.as_dvec3()).max_element() * SLAB_ERROR;
+    let grid = Grid::over(&bounds, margin + 1.0);
+    let record = |bounds: &Aabb, child: &Child| {
+        let lo = (grid.coordinate(bounds.lo) - margin).floor().clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
+        let hi = (grid.coordinate(bounds.hi) + margin).ceil().clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
+        let reference = match *child {
+            Child::Node(index) => index,
+            Child::Leaf { first, count } => !(first << 4 | count),
+        };
+        [lo.x | lo.y << 16, lo.z | hi.x << 16, hi.y | hi.z << 16, reference]
+    };
+    let records = bvh.nodes.par_iter().flat_map_iter(|node| {
+        [record(&node.bounds[0], &node.children[0]), record(&node.bounds[1], &node.children[1])]
+    });
+    Quantised { records: records.collect(), grid }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_example_of_the_bit_layout() {
+        let bounds = Aabb { lo: Vec3::ZERO, hi: Vec3::splat(60000.0) };
+        let bvh = Bvh {
+            nodes: vec![super::super::Node {
+                bounds: [bounds; 2],
+                children: [Child::Leaf { first: 10, count: 3 }, Child::Node(7)],
+            }],
+            order: vec![0],
+            bounds,
+        };
+        let quantised = quantise(&bvh, Vec3::ZERO);
+        assert_eq!(quantised.records[0][3], 0xffff_ff5c);
+        assert_eq!(quantised.records[1][3], 7);
+    }
+
+    #[test]
+    fn boxes_grow_outward_and_stay_on_the_grid() {
+        let boxes: Vec<Aabb> = (0..500)
+            .map(|i| {
+                let at = Vec3::new((i * 7919 % 499) as f32, (i * 104_729 % 491) as f32, 0.25);
+                Aabb { lo: at, hi: at + Vec3::new(1.0, 0.001, 0.0) }
+            })
+            .collect();
+        let bvh = Bvh::build(&boxes);
+        for reach in [0.0, 1e3, 1e6, 1e9] {
+            let quantised = quantise(&bvh, Vec3::splat(reach));
+            let world = |coordinates: [u32; 3]| {
+                DVec3::from_array(coordinates.map(f64::from)) / quantised.grid.scale.as_dvec3()
+                    + quantised.grid.origin.as_dvec3()
+            };
+            for (node, records) in bvh.nodes.iter().zip(quantised.records.chunks(2)) {
+                for (bounds, [x, y, z, _]) in node.bounds.iter().zip(records) {
+                    let lo = world([x & 0xffff, x >> 16, y & 0xffff]);
+                    let hi = world([y >> 16, z & 0xffff, z >> 16]);
+                    assert!(lo.cmplt(bounds.lo.as_dvec3()).all() && hi.cmpgt(bounds.hi.as_dvec3()).all(), "reach {reach}: {lo} {hi} {bounds:?}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Pictures: linear pixels, their files, and metrics between two of them.
+
+mod metrics;
+mod read;
+mod write;
+
+pub use metrics::{compare, heat_map, Metrics};
+pub use read::read;
+pub use write::{Format, Saved};
+
+/// Linear pixels, row by row from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Linear RGB (sRGB primaries) times alpha, and alpha = coverage.
+    pub pixels: Vec<[f32; 4]>,
+    /// Alpha is worth keeping: the background is transparent.
+    pub has_alpha: bool,
+}
+
+impl Film {
+    /// A black picture.
+    pub fn new(width: u32, height: u32, has_alpha: bool) -> Self {
+        Self { width, height, pixels: vec![[0.0; 4]; width as usize * height as usize], has_alpha }
+    }
+
+    /// 8-bit sRGB of a pixel, alpha not multiplied in.
+    pub fn srgb8(&self, pixel: usize) -> [u8; 4] {
+        self.srgb(pixel).map(|value| (value * 255.0 + 0.5) as u8)
+    }
+
+    /// sRGB (IEC 61966-2-1) of a pixel, 0 to 1, alpha not multiplied in.
+    pub fn srgb(&self, pixel: usize) -> [f32; 4] {
+        let [r, g, b, a] = self.pixels[pixel];
+        if !self.has_alpha {
+            return [encode(r), encode(g), encode(b), 1.0];
+        }
+        let straight = |value: f32| if a > 0.0 { encode(value / a) } else { 0.0 };
+        [straight(r), straight(g), straight(b), a.clamp(0.0, 1.0)]
+    }
+}
+
+/// Linear to sRGB; out of range is clamped, NaN becomes 0.
+fn encode(linear: f32) -> f32 {
+    let linear = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
+    if linear <= 0.003_130_8 {
+        linear * 12.92
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// sRGB to linear.
+fn decode(srgb: f32) -> f32 {
+    if srgb <= 0.04045 {
+        srgb / 12.92
+    } else {
+        ((srgb + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_8_bit_color_survives_being_linear() {
+        for value in 0..=255_u8 {
+            let linear = decode(f32::from(value) / 255.0);
+            let film = Film { width: 1, height: 1, pixels: vec![[linear, linear, linear, 1.0]], has_alpha: false };
+            assert_eq!(film.srgb8(0), [value, value, value, 255]);
+        }
+    }
+
+    #[test]
+    fn not_a_number_and_out_of_range_are_tamed() {
+        let pixels = vec![[f32::NAN, -1.0, f32::INFINITY, 1.0]];
+        assert_eq!(Film { width: 1, height: 1, pixels, has_alpha: false }.srgb8(0), [0, 0, 255, 255]);
+    }
+}

@@ -1,0 +1,27 @@
+//! File → film.
+
+use super::{decode, Film};
+use crate::error::{Error, Result};
+use image::{DynamicImage, ImageReader};
+use std::path::Path;
+
+/// Reads PNG, WebP, OpenEXR or Radiance HDR; what it is, its content says.
+///
+/// # Errors
+/// `Read` when the file cannot be read, `Content` when it is no picture.
+pub fn read(path: &Path) -> Result<Film> {
+    let file = path.display().to_string();
+    let open = |source| Error::Read { path: path.to_owned(), source };
+    let reader = ImageReader::open(path).map_err(open)?.with_guessed_format().map_err(open)?;
+    let image = reader.decode().map_err(|error| Error::content(&file, error))?;
+    let linear = matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
+    let has_alpha = image.color().has_alpha();
+    let image = image.into_rgba32f();
+    let (width, height) = image.dimensions();
+    // EXR stores colour times alpha, like the film; PNG and WebP do not.
+    let pixel = |pixel: &image::Rgba<f32>| {
+        let [r, g, b, a] = pixel.0;
+        if linear { [r, g, b, a] } else { [decode(r) * a, decode(g) * a, decode(b) * a, a] }
+    };
+    Ok(Film { width, height, pixels: image.pixels().map(pixel).collect(), has_alpha })
+}

@@ -1,0 +1,141 @@
+//! Film → file: PNG, OpenEXR, Radiance HDR; written beside the target, then renamed.
+
+use super::Film;
+use crate::error::{Error, Result};
+use image::codecs::{hdr::HdrEncoder, openexr::OpenExrEncoder, png};
+use image::{ExtendedColorType, ImageEncoder, ImageError, Rgb};
+use rayon::prelude::*;
+use sha2::{Digest, Sha256};
+use std::io::{BufWriter, Cursor, Write};
+use std::path::Path;
+
+/// How a picture is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// PNG, 8 bits a channel, sRGB.
+    Png8,
+    /// PNG, 16 bits a channel, sRGB.
+    Png16,
+    /// OpenEXR, 32-bit float, linear, alpha multiplied in.
+    Exr,
+    /// Radiance HDR, shared exponent, linear, no alpha.
+    Hdr,
+}
+
+/// What was stored.
+#[derive(Clone, Debug)]
+pub struct Saved {
+    /// SHA-256 of the pixels as handed to the encoder, hexadecimal.
+    pub sha256: String,
+}
+
+impl Format {
+    /// The format that a file's extension means; PNG gets `bits` a channel.
+    ///
+    /// # Errors
+    /// `Usage` for an unknown extension, or 16 bits for a format that is no PNG.
+    pub fn of(path: &Path, bits: u8) -> Result<Self> {
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match (extension.as_deref(), bits) {
+            (Some("png"), 8) => Ok(Format::Png8),
+            (Some("png"), _) => Ok(Format::Png16),
+            (Some("exr"), 8) => Ok(Format::Exr),
+            (Some("hdr"), 8) => Ok(Format::Hdr),
+            (Some("exr" | "hdr"), _) => Err(Error::Usage("--bits 16 is for PNG; EXR and HDR are always float".into())),
+            _ => Err(Error::Usage(format!("cannot tell the format of {}: end it in .png, .exr or .hdr", path.display()))),
+        }
+    }
+}
+
+impl Film {
+    /// Writes the picture to a temporary file in the target's folder and renames it, so that the target is never half
+    /// written; calls `may_finish` just before the rename.
+    ///
+    /// # Errors
+    /// `Write` when that fails; `Usage` when the format cannot hold the picture; whatever `may_finish` answers.
+    pub fn save(&self, path: &Path, format: Format, may_finish: impl FnOnce() -> Result<()>) -> Result<Saved> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut file = tempfile::Builder::new()
+            .prefix(".glimt-")
+            .permissions(output_permissions())
+            .tempfile_in(folder)
+            .map_err(|error| Error::write(path, error))?;
+        let mut writer = BufWriter::new(file.as_file_mut());
+        let saved = self.encode(&mut writer, format, path)?;
+        writer.flush().map_err(|error| Error::write(path, error))?;
+        drop(writer);
+        may_finish()?;
+        file.persist(path).map_err(|error| Error::write(path, error.error))?;
+        Ok(saved)
+    }
+
+    /// Writes the picture to a stream.
+    ///
+    /// # Errors
+    /// As [`Film::save`]; `name` stands for the stream in messages.
+    pub fn encode(&self, writer: &mut impl Write, format: Format, name: &Path) -> Result<Saved> {
+        let failed = |error: ImageError| Error::write(name, error);
+        let (width, height) = (self.width, self.height);
+        let pixels = 0..self.pixels.len();
+        let channels = if self.has_alpha { 4 } else { 3 };
+        let sha256;
+        match format {
+            Format::Png8 | Format::Png16 => {
+                let encoder =
+                    png::PngEncoder::new_with_quality(writer, png::CompressionType::Fast, png::FilterType::Adaptive);
+                let deep = format == Format::Png16;
+                let bytes: Vec<u8> = if deep {
+                    let sample = |value: f32| ((value * 65535.0 + 0.5) as u16).to_ne_bytes();
+                    pixels.into_par_iter().flat_map_iter(|i| self.srgb(i).into_iter().take(channels).flat_map(sample)).collect()
+                } else {
+                    pixels.into_par_iter().flat_map_iter(|i| self.srgb8(i).into_iter().take(channels)).collect()
+                };
+                sha256 = digest(&bytes);
+                let color = match (self.has_alpha, deep) {
+                    (false, false) => ExtendedColorType::Rgb8,
+                    (true, false) => ExtendedColorType::Rgba8,
+                    (false, true) => ExtendedColorType::Rgb16,
+                    (true, true) => ExtendedColorType::Rgba16,
+                };
+                encoder.write_image(&bytes, width, height, color).map_err(failed)?;
+            }
+            Format::Exr => {
+                let samples: Vec<f32> =
+                    self.pixels.iter().flat_map(|pixel| pixel.iter().copied().take(channels)).collect();
+                let bytes: &[u8] = bytemuck::cast_slice(&samples);
+                sha256 = digest(bytes);
+                let color = if self.has_alpha { ExtendedColorType::Rgba32F } else { ExtendedColorType::Rgb32F };
+                // The encoder seeks, a pipe cannot.
+                let mut file = Cursor::new(Vec::new());
+                OpenExrEncoder::new(&mut file).write_image(bytes, width, height, color).map_err(failed)?;
+                writer.write_all(file.get_ref()).map_err(|error| Error::write(name, error))?;
+            }
+            Format::Hdr => {
+                if self.has_alpha {
+                    return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
+                }
+                let rgb: Vec<Rgb<f32>> = self.pixels.iter().map(|[r, g, b, _]| Rgb([*r, *g, *b])).collect();
+                let samples: Vec<f32> = rgb.iter().flat_map(|pixel| pixel.0).collect();
+                sha256 = digest(bytemuck::cast_slice(&samples));
+                HdrEncoder::new(writer).encode(&rgb, width as usize, height as usize).map_err(failed)?;
+            }
+        }
+        Ok(Saved { sha256 })
+    }
+}
+
+/// Lower-case hexadecimal SHA-256.
+fn digest(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Temporary files are private by default; a picture is as public as any new file (the umask still applies).
+#[cfg(unix)]
+fn output_permissions() -> std::fs::Permissions {
+    std::os::unix::fs::PermissionsExt::from_mode(0o666)
+}
+
+#[cfg(not(unix))]
+fn output_permissions() -> std::fs::Permissions {
+    std::fs::metadata(".").map_or_else(|_| unreachable!("the current folder has permissions"), |data| data.permissions())
+}

@@ -1,0 +1,64 @@
+//! What host and device share, generated from `shaders/shared/{layout,bindings,features}.glsl` by `build.rs`.
+//!
+//! Structs are `#[repr(C)]` with 4-byte members only, which is exactly GLSL's scalar block layout. Holds no logic.
+
+// Used by build.rs and by the tests.
+#[allow(dead_code)]
+pub mod translate;
+
+#[allow(clippy::excessive_precision)]
+mod generated {
+    include!(concat!(env!("OUT_DIR"), "/layout.rs"));
+}
+pub use generated::*;
+
+/// Features as specialization constants.
+mod generated_features {
+    include!(concat!(env!("OUT_DIR"), "/features.rs"));
+}
+pub use generated_features::Features;
+
+/// Descriptor slots.
+pub mod binding {
+    use super::{Binding, BindingKind};
+    include!(concat!(env!("OUT_DIR"), "/bindings.rs"));
+}
+
+/// SPIR-V of every kernel, in both ways of fetching.
+pub mod kernels {
+    use super::KernelCode;
+    include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
+}
+
+/// How the device reaches a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BindingKind {
+    /// Read-only `uvec4` texels: a uniform texel buffer, or a storage buffer where texel buffers are too small.
+    Fetch,
+    /// A storage buffer.
+    Storage,
+    /// A uniform buffer.
+    Uniform,
+}
+
+/// One line of `bindings.glsl`.
+#[derive(Clone, Copy, Debug)]
+pub struct Binding {
+    /// Descriptor slot in set 0.
+    pub slot: u32,
+    /// Name in the shaders.
+    pub name: &'static str,
+    /// How it is reached.
+    pub kind: BindingKind,
+}
+
+/// One kernel, compiled.
+#[derive(Clone, Copy, Debug)]
+pub struct KernelCode {
+    /// File name without `.comp`: also the pass, its timing row and its debug label.
+    pub name: &'static str,
+    /// SPIR-V that fetches from texel buffers.
+    pub texel_fetch: &'static [u8],
+    /// SPIR-V that fetches from storage buffers.
+    pub storage_fetch: &'static [u8],
+}

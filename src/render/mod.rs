@@ -1,0 +1,219 @@
+//! Scene → picture on a Vulkan device: what is needed ([`Plan`]), where it lies (`upload`), in which order it runs (`frame`).
+
+mod frame;
+mod options;
+mod plan;
+mod upload;
+
+pub use options::{Options, Progress};
+pub use plan::{LeftOut, Plan, PlannedBuffer, PlannedPass};
+
+use crate::bvh::{quantise, Aabb, Bvh};
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::layout::{binding, BindingKind, Features, KernelCode, Step};
+use crate::report::{self, Report};
+use crate::scene::{Scene, Soup, View};
+use crate::vulkan::{BindingSlot, Device, DeviceChoice, Fetch, Instance, Kernel, Layout, SlotKind};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+/// Renders a scene: opens the device, computes the picture, reports what it did.
+///
+/// To render several scenes, keep a [`Renderer`].
+///
+/// # Errors
+/// `Usage` for options that make no sense, `NoDevice`, `Vulkan` or `Device` when there is no device or it fails,
+/// `Validation` when validation is on and the layers complain.
+pub fn render(scene: &Scene, options: &Options) -> Result<(Film, Report)> {
+    Renderer::new(&options.device, options.validate)?.render(scene, options)
+}
+
+/// An open device with its kernels, for any number of scenes.
+pub struct Renderer {
+    device: Arc<Device>,
+    layout: Arc<Layout>,
+    /// Compiled kernels by name and features: a second pipeline of the same code would be compiled again.
+    kernels: Mutex<HashMap<(&'static str, Features), Arc<Kernel>>>,
+    opened_in_ms: f64,
+}
+
+/// A scene made ready for any renderer: its triangles and what it needs.
+pub struct Prepared {
+    /// Triangles in world space.
+    pub soup: Soup,
+    /// Camera, lights, picture.
+    pub view: View,
+    /// What it needs.
+    pub features: Features,
+}
+
+impl Prepared {
+    /// Resolves the camera, makes the soup, finds the features.
+    ///
+    /// # Errors
+    /// As [`Options::view`] and [`Soup::of`].
+    pub fn new(scene: &Scene, options: &Options) -> Result<Self> {
+        let view = options.view(scene)?;
+        let soup = Soup::of(scene)?;
+        let features =
+            if options.all_features { Features::ALL } else { crate::scene::features::of(scene, &soup, &view) };
+        Ok(Self { soup, view, features })
+    }
+}
+
+impl Renderer {
+    /// Opens Vulkan and a device.
+    ///
+    /// # Errors
+    /// `NoDevice` when there is none; `Vulkan` when the driver refuses.
+    pub fn new(choice: &DeviceChoice, validate: bool) -> Result<Self> {
+        let start = Instant::now();
+        let instance = Instance::new(validate)?;
+        let device = Device::open(&instance, choice)?;
+        let slots: Vec<BindingSlot> = binding::ALL
+            .iter()
+            .map(|binding| BindingSlot {
+                slot: binding.slot,
+                kind: match binding.kind {
+                    BindingKind::Fetch => SlotKind::Fetch,
+                    BindingKind::Storage => SlotKind::Storage,
+                    BindingKind::Uniform => SlotKind::Uniform,
+                },
+            })
+            .collect();
+        let layout = Layout::new(&device, &slots, size_of::<Step>() as u32)?;
+        Ok(Self { device, layout, kernels: Mutex::default(), opened_in_ms: milliseconds(start) })
+    }
+
+    /// The open device.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// The kernel with these features, compiled once.
+    fn kernel(&self, code: &KernelCode, features: Features) -> Result<Arc<Kernel>> {
+        let mut kernels = self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kernel) = kernels.get(&(code.name, features)) {
+            return Ok(kernel.clone());
+        }
+        let spirv = match self.device.fetch {
+            Fetch::Texel => code.texel_fetch,
+            Fetch::Storage => code.storage_fetch,
+        };
+        let constants = features.list().map(|(_, on)| on);
+        let kernel = Arc::new(Kernel::new(&self.layout, code.name, spirv, &constants)?);
+        kernels.insert((code.name, features), kernel.clone());
+        Ok(kernel)
+    }
+
+    /// Renders a scene on this device.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn render(&self, scene: &Scene, options: &Options) -> Result<(Film, Report)> {
+        let start = Instant::now();
+        let prepared = Prepared::new(scene, options)?;
+        let load = milliseconds(start);
+        self.render_prepared(scene, &prepared, options).map(|(film, mut report)| {
+            report.times_ms.load = load;
+            report.times_ms.total = milliseconds(start) + self.opened_in_ms;
+            (film, report)
+        })
+    }
+
+    /// Renders a scene that was prepared with the same options.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn render_prepared(&self, scene: &Scene, prepared: &Prepared, options: &Options) -> Result<(Film, Report)> {
+        let start = Instant::now();
+        let (bvh, center) = build_tree(&prepared.soup);
+        let bvh_ms = milliseconds(start);
+        self.render_with_tree(scene, prepared, options, &bvh, center).map(|(film, mut report)| {
+            report.times_ms.bvh = bvh_ms;
+            (film, report)
+        })
+    }
+
+    /// Renders a prepared scene whose tree was built beside the opening of the device.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn render_with_tree(
+        &self,
+        scene: &Scene,
+        prepared: &Prepared,
+        options: &Options,
+        bvh: &Bvh,
+        center: glam::DVec3,
+    ) -> Result<(Film, Report)> {
+        let Prepared { soup, view, features } = prepared;
+        let plan = Plan::new(scene, soup, view, *features, bvh.nodes.len(), options.samples_in_flight);
+        let start = Instant::now();
+        let quantised = quantise(bvh, (view.camera.eye - center).abs().as_vec3());
+        let frame = frame::Frame::new(self, upload::Scene { scene, soup, view, bvh, quantised: &quantised, center }, plan)?;
+        let upload = milliseconds(start);
+        let start = Instant::now();
+        let (film, outcome) = frame.run(options)?;
+        let render = milliseconds(start);
+        let messages = self.device.instance.messages();
+        if !messages.is_empty() {
+            return Err(Error::Validation(messages));
+        }
+        let stats = bvh.stats();
+        let info = &self.device.info;
+        let report = Report {
+            image: report::Image { width: view.width, height: view.height, ..Default::default() },
+            device: report::Device {
+                name: info.name.clone(),
+                driver: info.driver.clone(),
+                api: info.api.clone(),
+                kind: info.kind.name().into(),
+                subgroup_size: info.subgroup_size,
+            },
+            scene: describe(scene, soup, view),
+            features: features.list().into_iter().collect(),
+            passes: outcome.passes,
+            rays: outcome.rays,
+            bvh: report::Tree {
+                nodes: stats.nodes,
+                depth: stats.depth,
+                sah_cost: stats.sah_cost,
+                bytes: size_of_val(quantised.records.as_slice()) as u64,
+            },
+            times_ms: report::Times { device: self.opened_in_ms, upload, render, ..Default::default() },
+            memory_bytes: report::Memory { device_peak: self.device.peak_memory(), queues: outcome.queue_bytes },
+        };
+        Ok((film, report))
+    }
+}
+
+/// The scene's part of a report.
+pub fn describe(scene: &Scene, soup: &Soup, view: &View) -> report::Scene {
+    report::Scene {
+        triangles: soup.len(),
+        instances: scene.instances.len(),
+        lights: view.lights.len(),
+        materials: scene.materials.len(),
+        warnings: scene.warnings.iter().chain(&soup.warnings).cloned().collect(),
+    }
+}
+
+/// The tree over a soup in the device's world, and that world's origin: the soup's centre.
+pub fn build_tree(soup: &Soup) -> (Bvh, glam::DVec3) {
+    use rayon::prelude::*;
+    let center = soup.center();
+    let boxes: Vec<Aabb> = soup
+        .positions
+        .par_iter()
+        .map(|corners| Aabb::of(corners.map(|corner| (corner - center).as_vec3())))
+        .collect();
+    (Bvh::build(&boxes), center)
+}
+
+/// Milliseconds since `start`.
+fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}

@@ -1,0 +1,79 @@
+//! What a caller may choose.
+
+use crate::error::Result;
+use crate::scene::{Background, CameraChoice, Scene, View};
+use crate::vulkan::DeviceChoice;
+use glam::DVec3;
+use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
+
+/// Called with the samples done and the samples in all, some times a second.
+pub type Progress = Arc<dyn Fn(u64, u64) + Send + Sync>;
+
+/// Options of a picture. [`Options::default`] is what `glimt render` does without flags.
+#[derive(Clone)]
+pub struct Options {
+    /// Pixels across and down. Default 1024 × 768.
+    pub size: (u32, u32),
+    /// Samples a pixel. Default 1: through the centre.
+    pub samples: u32,
+    /// Reflections one after the other. Default 8.
+    pub max_depth: u32,
+    /// Camera. Default: the file's first, or one that frames the scene.
+    pub camera: CameraChoice,
+    /// Up of cameras that are not the file's. Default +y.
+    pub up: DVec3,
+    /// Vertical field of view in radians, instead of the camera's own.
+    pub fov: Option<f64>,
+    /// Default: a soft gradient.
+    pub background: Background,
+    /// A light where the file has none. Default true.
+    pub default_light: bool,
+    /// Device. Default: the best.
+    pub device: DeviceChoice,
+    /// Validation layers on; any message is an error. Default false.
+    pub validate: bool,
+    /// Pixel samples traced at once: bounds the queues' memory, changes no pixel. Default 2¹⁸.
+    pub samples_in_flight: u32,
+    /// Every feature on, needed or not: slower, the same picture. For tests.
+    pub all_features: bool,
+    /// Progress.
+    pub progress: Option<Progress>,
+    /// Set to stop early with `Error::Interrupted`.
+    pub interrupted: Arc<AtomicBool>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            size: (1024, 768),
+            samples: 1,
+            max_depth: 8,
+            camera: CameraChoice::Auto,
+            up: DVec3::Y,
+            fov: None,
+            background: Background::default(),
+            default_light: true,
+            device: DeviceChoice::Best,
+            validate: false,
+            samples_in_flight: 1 << 18,
+            all_features: false,
+            progress: None,
+            interrupted: Arc::default(),
+        }
+    }
+}
+
+impl Options {
+    /// The view of `scene` that these options mean.
+    ///
+    /// # Errors
+    /// `Usage` when the camera or a number makes no sense.
+    pub fn view(&self, scene: &Scene) -> Result<View> {
+        let aspect = f64::from(self.size.0.max(1)) / f64::from(self.size.1.max(1));
+        let camera = scene.camera(&self.camera, self.up, self.fov, aspect)?;
+        let mut view = View::new(scene, camera, self.size, self.samples, self.max_depth)?;
+        view.background = self.background;
+        Ok(if self.default_light { view.with_default_light(scene) } else { view })
+    }
+}

@@ -1,0 +1,176 @@
+//! What a scene gets: features, passes, buffers; and what was left out and why. Computed without any device, and the only
+//! source from which the frame is recorded and buffers are allocated.
+
+use crate::layout::{
+    Features, HitItem, Light, Material, ReflectionItem, ShadowItem, NODE_TEXELS, TILE, TRIANGLE_TEXELS, WORKGROUP,
+};
+use crate::scene::{Scene, Soup, View};
+
+/// Bytes of a texel.
+const TEXEL: u64 = 16;
+/// Bytes of a pixel or sample: RGBA in f32.
+const PIXEL: u64 = 16;
+/// Largest grid of workgroups that every device allows, as samples.
+const MOST_IN_FLIGHT: u32 = 65_535 * WORKGROUP;
+
+/// A pass of the frame.
+#[derive(Clone, Debug)]
+pub struct PlannedPass {
+    /// Kernel.
+    pub name: &'static str,
+    /// Dispatches in the whole picture.
+    pub dispatches: u64,
+    /// What it does, in a few words.
+    pub purpose: &'static str,
+}
+
+/// A buffer on the device.
+#[derive(Clone, Debug)]
+pub struct PlannedBuffer {
+    /// Name in the shaders.
+    pub name: &'static str,
+    /// Bytes before padding; 0 when left out.
+    pub bytes: u64,
+    /// It is a queue.
+    pub is_queue: bool,
+}
+
+/// Something that this scene does not need.
+#[derive(Clone, Debug)]
+pub struct LeftOut {
+    /// Pass, buffer or feature.
+    pub name: &'static str,
+    /// Why.
+    pub reason: String,
+}
+
+/// What is done for a view of a scene.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Features compiled in.
+    pub features: Features,
+    /// Pixels of the picture in tile order, with those beyond its edges.
+    pub padded_pixels: u64,
+    /// Pixels in a band.
+    pub band_pixels: u32,
+    /// Samples of each pixel in a wave; a band takes as many waves as its samples need.
+    pub wave_samples: u32,
+    /// Rounds of shading: the camera's and one a reflection.
+    pub rounds: u32,
+    /// Runs of the shade pass in a round: one a light, at least one.
+    pub lights: u32,
+    /// Passes in the order of the frame.
+    pub passes: Vec<PlannedPass>,
+    /// Buffers in the order of their slots.
+    pub buffers: Vec<PlannedBuffer>,
+    /// What was left out.
+    pub left_out: Vec<LeftOut>,
+}
+
+impl Plan {
+    /// The plan for a view whose tree has `nodes` inner nodes.
+    pub fn new(scene: &Scene, soup: &Soup, view: &View, features: Features, nodes: usize, in_flight: u32) -> Self {
+        let tiles = u64::from(view.width.div_ceil(TILE)) * u64::from(view.height.div_ceil(TILE));
+        let padded_pixels = tiles * u64::from(TILE * TILE);
+        let in_flight = in_flight.clamp(WORKGROUP, MOST_IN_FLIGHT) / WORKGROUP * WORKGROUP;
+        // Whole tiles; all samples of a pixel at once if a tile's fit.
+        let band_pixels = (in_flight / view.samples / WORKGROUP * WORKGROUP).max(WORKGROUP);
+        let band_pixels = u64::from(band_pixels).min(padded_pixels) as u32;
+        let wave_samples = (in_flight / band_pixels).min(view.samples);
+        let mut plan = Self {
+            features,
+            padded_pixels,
+            band_pixels,
+            wave_samples,
+            rounds: if features.reflections { view.max_depth + 1 } else { 1 },
+            lights: if features.shadows { (view.lights.len() as u32).max(1) } else { 1 },
+            passes: Vec::new(),
+            buffers: Vec::new(),
+            left_out: Vec::new(),
+        };
+        plan.plan_passes(view);
+        plan.plan_buffers(scene, soup, view, nodes);
+        plan.explain_left_out(view);
+        plan
+    }
+
+    /// Waves in the whole picture.
+    pub fn waves(&self, samples: u32) -> u64 {
+        self.bands() * u64::from(samples.div_ceil(self.wave_samples))
+    }
+
+    fn bands(&self) -> u64 {
+        self.padded_pixels.div_ceil(u64::from(self.band_pixels))
+    }
+
+    /// Pixel samples in flight.
+    fn in_flight(&self) -> u64 {
+        u64::from(self.band_pixels) * u64::from(self.wave_samples)
+    }
+
+    fn plan_passes(&mut self, view: &View) {
+        let waves = self.waves(view.samples);
+        let (rounds, lights) = (u64::from(self.rounds), u64::from(self.lights));
+        let mut pass = |name, dispatches, purpose| {
+            if dispatches > 0 {
+                self.passes.push(PlannedPass { name, dispatches: waves * dispatches, purpose });
+            }
+        };
+        let (shadows, reflections) = (self.features.shadows, self.features.reflections);
+        pass("primary", 1, "camera rays → nearest hits or background");
+        // Hits before each round; after each light its shadow rays, after the last one the reflected rays too.
+        let after_shading = if shadows { rounds * lights } else if reflections { rounds - 1 } else { 0 };
+        pass("prepare", rounds + after_shading, "queue counts → dispatch arguments");
+        pass("shade", rounds * lights, "ambient, emission, one light each → shadow and reflection queues");
+        pass("shadow", if shadows { rounds * lights } else { 0 }, "shadow rays → the light's part, where nothing blocks it");
+        pass("reflection", if reflections { rounds - 1 } else { 0 }, "reflected rays → nearest hits or background");
+        pass("resolve", 1, "samples → pixels");
+    }
+
+    fn plan_buffers(&mut self, scene: &Scene, soup: &Soup, view: &View, nodes: usize) {
+        let features = self.features;
+        let triangles = soup.len() as u64;
+        let in_flight = self.in_flight();
+        let per_triangle = |needed: bool| if needed { triangles * u64::from(TRIANGLE_TEXELS) * TEXEL } else { 0 };
+        let queue = |needed: bool, item: usize| if needed { in_flight * item as u64 } else { 0 };
+        let mut buffer = |name, bytes, is_queue| self.buffers.push(PlannedBuffer { name, bytes, is_queue });
+        buffer("nodes", nodes as u64 * u64::from(NODE_TEXELS) * TEXEL, false);
+        buffer("triangles", per_triangle(true), false);
+        buffer("normals", per_triangle(features.smooth_normals), false);
+        buffer("colors", per_triangle(features.vertex_colors), false);
+        buffer("frame", size_of::<crate::layout::Frame>() as u64, false);
+        buffer("materials", (scene.materials.len() * size_of::<Material>()) as u64, false);
+        let lights = if features.shadows { view.lights.len() * size_of::<Light>() } else { 0 };
+        buffer("lights", lights as u64, false);
+        buffer("hit_queue", queue(true, size_of::<HitItem>()), true);
+        buffer("shadow_queue", queue(features.shadows, size_of::<ShadowItem>()), true);
+        buffer("reflection_queue", queue(features.reflections, size_of::<ReflectionItem>()), true);
+        buffer("counters", 4 * u64::from(crate::layout::COUNTERS), false);
+        buffer("dispatches", 12 * u64::from(crate::layout::QUEUES), false);
+        buffer("radiance", in_flight * PIXEL, false);
+        buffer("film", u64::from(self.band_pixels) * PIXEL, false);
+    }
+
+    fn explain_left_out(&mut self, view: &View) {
+        let features = self.features;
+        let no_light = if view.lights.is_empty() { "no light shines" } else { "no material answers to light" };
+        let no_mirror = if view.max_depth == 0 { "the maximum depth is 0" } else { "no material mirrors" };
+        let mut leave = |needed: bool, names: &[&'static str], reason: &str| {
+            if !needed {
+                self.left_out.extend(names.iter().map(|name| LeftOut { name, reason: reason.into() }));
+            }
+        };
+        leave(features.shadows, &["shadow pass", "shadow_queue", "lights"], no_light);
+        leave(features.specular, &["specular term"], if features.shadows { "no material is glossy" } else { no_light });
+        leave(features.reflections, &["reflection pass", "reflection_queue"], no_mirror);
+        leave(features.smooth_normals, &["normals"], "all triangles are flat");
+        leave(features.vertex_colors, &["colors"], "no mesh has vertex colours");
+        leave(features.single_sided, &["back-face culling"], "all materials are double-sided");
+        leave(features.multisampling, &["sample positions"], "one sample a pixel goes through its centre");
+    }
+
+    /// Bytes of the queues.
+    pub fn queue_bytes(&self) -> u64 {
+        self.buffers.iter().filter(|buffer| buffer.is_queue).map(|buffer| buffer.bytes).sum()
+    }
+}

@@ -1,0 +1,161 @@
+//! Scene → device buffers, in the layout of `shaders/shared/layout.glsl`.
+
+use super::Renderer;
+use crate::bvh::{Bvh, Quantised};
+use crate::error::Result;
+use crate::layout::{
+    self, binding, Features, FAR, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, TILE, TRIANGLE_COLORED,
+    TRIANGLE_SINGLE_SIDED, TRIANGLE_SMOOTH,
+};
+use crate::scene::{self, LightKind, Projection, Soup, View};
+use crate::vulkan::{Buffer, Memory, Usage};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// All that is uploaded.
+#[derive(Clone, Copy)]
+pub(super) struct Scene<'a> {
+    pub scene: &'a scene::Scene,
+    pub soup: &'a Soup,
+    pub view: &'a View,
+    pub bvh: &'a Bvh,
+    pub quantised: &'a Quantised,
+    /// Origin of the device's world.
+    pub center: DVec3,
+}
+
+impl Scene<'_> {
+    /// Makes the buffer of a slot that holds scene data; `None` for the frame's own slots.
+    pub fn buffer(&self, renderer: &Renderer, slot: u32, features: Features) -> Option<Result<Buffer>> {
+        let make = |name, bytes: &[u8], usage| Buffer::with_data(&renderer.device, name, bytes, usage);
+        Some(match slot {
+            binding::NODES => make("nodes", bytemuck::cast_slice(&self.quantised.records), Usage::Fetch),
+            binding::TRIANGLES => make("triangles", bytemuck::cast_slice(&self.triangles()), Usage::Fetch),
+            binding::NORMALS => {
+                let normals = if features.smooth_normals { self.per_primitive(&self.soup.normals) } else { Vec::new() };
+                make("normals", bytemuck::cast_slice(&normals), Usage::Fetch)
+            }
+            binding::COLORS => {
+                let colors = if features.vertex_colors { self.per_primitive(&self.soup.colors) } else { Vec::new() };
+                make("colors", bytemuck::cast_slice(&colors), Usage::Fetch)
+            }
+            binding::FRAME => make("frame", bytemuck::bytes_of(&self.frame()), Usage::Uniform),
+            binding::MATERIALS => {
+                let materials: Vec<_> = self.scene.materials.iter().map(material).collect();
+                make("materials", bytemuck::cast_slice(&materials), Usage::Storage)
+            }
+            binding::LIGHTS => {
+                let lights: Vec<_> = self.view.lights.iter().map(|light| self.light(light)).collect();
+                let lights = if features.shadows { lights.as_slice() } else { &[] };
+                make("lights", bytemuck::cast_slice(lights), Usage::Storage)
+            }
+            _ => return None,
+        })
+    }
+
+    /// A point in the device's world.
+    fn local(&self, point: DVec3) -> Vec3 {
+        (point - self.center).as_vec3()
+    }
+
+    /// Three texels a triangle in leaf order.
+    fn triangles(&self) -> Vec<[[u32; 4]; 3]> {
+        let soup = self.soup;
+        let triangle = |primitive: &u32| {
+            let index = *primitive as usize;
+            let flags = soup.flags[index];
+            let bits = [
+                (flags.single_sided, TRIANGLE_SINGLE_SIDED),
+                (flags.smooth, TRIANGLE_SMOOTH),
+                (flags.colored, TRIANGLE_COLORED),
+            ];
+            let flags = bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
+            let extra = [*primitive, soup.materials[index], flags];
+            let texel = |corner: usize| with_bits(self.local(soup.positions[index][corner]), extra[corner]);
+            [texel(0), texel(1), texel(2)]
+        };
+        self.bvh.order.par_iter().map(triangle).collect()
+    }
+
+    /// Three texels a primitive; zeros where the soup has no such data.
+    fn per_primitive(&self, vectors: &[[Vec3; 3]]) -> Vec<[[u32; 4]; 3]> {
+        if vectors.is_empty() {
+            return vec![[[0; 4]; 3]; self.soup.len()];
+        }
+        vectors.par_iter().map(|corners| corners.map(|corner| with_bits(corner, 0))).collect()
+    }
+
+    fn frame(&self) -> layout::Frame {
+        let view = self.view;
+        let (right, up) = view.camera.half_axes(f64::from(view.width) / f64::from(view.height));
+        let (strata_x, strata_y) = view.strata();
+        layout::Frame {
+            eye: self.local(view.camera.eye).into(),
+            forward: view.camera.forward.as_vec3().into(),
+            right: right.as_vec3().into(),
+            up: up.as_vec3().into(),
+            orthographic: u32::from(matches!(view.camera.projection, Projection::Orthographic { .. })),
+            width: view.width,
+            height: view.height,
+            tiles_across: view.width.div_ceil(TILE),
+            samples: view.samples,
+            strata_x,
+            strata_y,
+            nadir: view.background.radiance(DVec3::NEG_Y).as_vec3().into(),
+            zenith: view.background.radiance(DVec3::Y).as_vec3().into(),
+            background_alpha: view.background.alpha() as f32,
+            grid_origin: self.quantised.grid.origin.into(),
+            grid_scale: self.quantised.grid.scale.into(),
+        }
+    }
+
+    fn light(&self, light: &scene::Light) -> layout::Light {
+        let (kind, spot_scale, spot_offset) = match light.kind {
+            LightKind::Point => (LIGHT_POINT, 0.0, 0.0),
+            LightKind::Directional => (LIGHT_DIRECTIONAL, 0.0, 0.0),
+            LightKind::Spot { inner_cosine, outer_cosine } => {
+                // KHR_lights_punctual's own formula, with its guard against equal angles.
+                let scale = 1.0 / (inner_cosine - outer_cosine).max(0.001);
+                (LIGHT_SPOT, scale, -outer_cosine * scale)
+            }
+        };
+        layout::Light {
+            kind,
+            position: self.local(light.position).into(),
+            direction: light.direction.as_vec3().into(),
+            intensity: light.intensity.as_vec3().into(),
+            range: light.range.map_or(FAR, |range| range as f32),
+            spot_scale: spot_scale as f32,
+            spot_offset: spot_offset as f32,
+        }
+    }
+}
+
+fn with_bits(vector: Vec3, bits: u32) -> [u32; 4] {
+    [vector.x.to_bits(), vector.y.to_bits(), vector.z.to_bits(), bits]
+}
+
+/// The coefficients are linear in the tint: what is left at tint 0 is constant, the rest is multiplied.
+fn material(material: &scene::Material) -> layout::Material {
+    let (constant, full) = (material.whitted(DVec3::ZERO), material.whitted(DVec3::ONE));
+    layout::Material {
+        ambient_tinted: full.ambient.as_vec3().into(),
+        emission: material.emission.as_vec3().into(),
+        diffuse_tinted: full.diffuse.as_vec3().into(),
+        specular: constant.specular.as_vec3().into(),
+        specular_tinted: (full.specular - constant.specular).as_vec3().into(),
+        shininess: full.shininess as f32,
+        mirror: constant.mirror.as_vec3().into(),
+        mirror_tinted: (full.mirror - constant.mirror).as_vec3().into(),
+    }
+}
+
+/// Makes the buffer of a slot that only the frame itself writes.
+pub(super) fn frame_buffer(renderer: &Renderer, slot: u32, name: &'static str, bytes: u64) -> Result<Buffer> {
+    let (usage, memory) = match slot {
+        binding::COUNTERS | binding::FILM => (Usage::Storage, Memory::ReadBack),
+        binding::DISPATCHES => (Usage::Indirect, Memory::Device),
+        _ => (Usage::Storage, Memory::Device),
+    };
+    Buffer::new(&renderer.device, name, bytes, usage, memory)
+}

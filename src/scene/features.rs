@@ -1,0 +1,29 @@
+//! What a scene needs of the renderer.
+
+use super::{Material, Scene, Soup, View};
+use crate::layout::Features;
+use glam::DVec3;
+
+/// The features that this view of this scene needs, and no more.
+pub fn of(scene: &Scene, soup: &Soup, view: &View) -> Features {
+    let mut used = vec![false; scene.materials.len()];
+    for material in &soup.materials {
+        used[*material as usize] = true;
+    }
+    let materials: Vec<&Material> =
+        scene.materials.iter().zip(&used).filter(|(_, used)| **used).map(|(material, _)| material).collect();
+    let any = |of: fn(&Material) -> DVec3| materials.iter().any(|material| of(material).max_element() > 0.0);
+    let specular = any(|material| material.whitted(DVec3::ONE).specular);
+    let diffuse = any(|material| material.whitted(DVec3::ONE).diffuse);
+    let mirror = any(|material| material.whitted(DVec3::ONE).mirror);
+    let shadows = !view.lights.is_empty() && (specular || diffuse);
+    Features {
+        smooth_normals: soup.flags.iter().any(|flags| flags.smooth),
+        vertex_colors: soup.flags.iter().any(|flags| flags.colored),
+        single_sided: soup.flags.iter().any(|flags| flags.single_sided),
+        specular: shadows && specular,
+        shadows,
+        reflections: mirror && view.max_depth > 0,
+        multisampling: view.samples > 1,
+    }
+}

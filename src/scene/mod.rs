@@ -1,0 +1,99 @@
+//! Scenes as plain data, in the field's terms: meshes, instances, materials, lights, cameras. Knows no GPU.
+//!
+//! ```text
+//! .glb/.gltf ─ gltf::read ─┐
+//! built-in  ─ builtin ─────┴→ Scene ─┬─ Scene::view → View (camera, lights, picture)
+//!                                    ├─ Soup::of    → every instance's triangles in world space
+//!                                    └─ features    → what this scene needs of the renderer
+//! ```
+//! Lengths are metres, angles radians, colours linear RGB with the sRGB primaries. World space is right-handed, y up.
+
+mod background;
+mod builtin;
+mod camera;
+pub mod features;
+pub mod gltf;
+mod light;
+mod material;
+pub mod shapes;
+mod soup;
+mod teapot;
+mod view;
+
+pub use background::Background;
+pub use builtin::{built_in, BUILT_IN};
+pub use camera::{Camera, CameraChoice, Projection};
+pub use light::{Light, LightKind};
+pub use material::{Material, Whitted};
+pub use soup::{Soup, TriangleFlags};
+pub use view::View;
+
+use glam::{DMat4, DVec3, Vec3};
+
+/// One glTF primitive: triangles of one material.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Name, for messages.
+    pub name: String,
+    /// Vertex positions, object space.
+    pub positions: Vec<Vec3>,
+    /// Vertex normals, object space, one a position; empty for flat shading.
+    pub normals: Vec<Vec3>,
+    /// Vertex colours, linear RGB, one a position; empty for white.
+    pub colors: Vec<Vec3>,
+    /// Three vertices a triangle, counter-clockwise seen from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+}
+
+/// A mesh somewhere in the world.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Index into [`Scene::meshes`].
+    pub mesh: usize,
+    /// Object space to world space.
+    pub world_from_object: DMat4,
+}
+
+/// All that a file says, and what of it was left out.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Name: the file's stem or the built-in's name.
+    pub name: String,
+    /// Geometry, each once.
+    pub meshes: Vec<Mesh>,
+    /// Where it stands.
+    pub instances: Vec<Instance>,
+    /// Materials; never empty when there are meshes.
+    pub materials: Vec<Material>,
+    /// Lights, world space.
+    pub lights: Vec<Light>,
+    /// The file declares lights, be it dark ones: then no default light is added.
+    pub has_lights: bool,
+    /// Cameras with their names, world space.
+    pub cameras: Vec<(String, Camera)>,
+    /// What was approximated, ignored or dropped, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// Triangles of all instances.
+    pub fn triangle_count(&self) -> usize {
+        self.instances.iter().map(|instance| self.meshes[instance.mesh].triangles.len()).sum()
+    }
+
+    /// World-space corners of the box around all instances; `None` when there is nothing.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let mut bounds: Option<(DVec3, DVec3)> = None;
+        for instance in &self.instances {
+            for position in &self.meshes[instance.mesh].positions {
+                let point = instance.world_from_object.transform_point3(position.as_dvec3());
+                if point.is_finite() {
+                    bounds = Some(bounds.map_or((point, point), |(lo, hi)| (lo.min(point), hi.max(point))));
+                }
+            }
+        }
+        bounds
+    }
+}

@@ -1,0 +1,232 @@
+//! Recording: bind, push, dispatch, barrier, timestamp; then submit and wait.
+
+use super::{failed, Bindings, Buffer, Device, Kernel};
+use crate::error::Result;
+use ash::vk;
+use std::ffi::CString;
+use std::sync::Arc;
+
+/// Who touches memory, for barriers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// A kernel writes it.
+    ShaderWrite,
+    /// A kernel reads or writes it.
+    ShaderReadWrite,
+    /// A kernel reads or writes it, and indirect dispatches read their arguments from it.
+    ShaderAndIndirect,
+    /// The host reads it.
+    HostRead,
+    /// The device copies or fills it.
+    Transfer,
+}
+
+impl Access {
+    fn stage(self) -> vk::PipelineStageFlags {
+        match self {
+            Access::ShaderWrite | Access::ShaderReadWrite => vk::PipelineStageFlags::COMPUTE_SHADER,
+            Access::ShaderAndIndirect => {
+                vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::DRAW_INDIRECT
+            }
+            Access::HostRead => vk::PipelineStageFlags::HOST,
+            Access::Transfer => vk::PipelineStageFlags::TRANSFER,
+        }
+    }
+
+    fn flags(self) -> vk::AccessFlags {
+        match self {
+            Access::ShaderWrite => vk::AccessFlags::SHADER_WRITE,
+            Access::ShaderReadWrite => vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE,
+            Access::ShaderAndIndirect => {
+                vk::AccessFlags::SHADER_READ
+                    | vk::AccessFlags::SHADER_WRITE
+                    | vk::AccessFlags::INDIRECT_COMMAND_READ
+            }
+            Access::HostRead => vk::AccessFlags::HOST_READ,
+            Access::Transfer => vk::AccessFlags::TRANSFER_WRITE | vk::AccessFlags::TRANSFER_READ,
+        }
+    }
+}
+
+/// A command buffer that is recorded, submitted once, and waited for.
+pub struct Commands {
+    device: Arc<Device>,
+    pool: vk::CommandPool,
+    buffer: vk::CommandBuffer,
+    fence: vk::Fence,
+    timestamps: vk::QueryPool,
+    /// Name of each dispatch, whose end timestamp has the next index.
+    timed: Vec<&'static str>,
+    most_timed: usize,
+}
+
+impl Commands {
+    /// Begins recording. At most `most_timed` dispatches get a timestamp.
+    ///
+    /// # Errors
+    /// `Vulkan` when the driver refuses.
+    pub fn new(device: &Arc<Device>, most_timed: usize) -> Result<Self> {
+        let most_timed = if device.timestamp_period.is_some() { most_timed } else { 0 };
+        // Owns each object as soon as it is made; null handles are ignored when destroyed.
+        let mut commands = Self {
+            device: device.clone(),
+            pool: vk::CommandPool::null(),
+            buffer: vk::CommandBuffer::null(),
+            fence: vk::Fence::null(),
+            timestamps: vk::QueryPool::null(),
+            timed: Vec::with_capacity(most_timed),
+            most_timed,
+        };
+        let raw = &device.raw;
+        let info = vk::CommandPoolCreateInfo::default().queue_family_index(device.queue_family);
+        // SAFETY: the family is the one of the device's queue.
+        commands.pool = unsafe { raw.create_command_pool(&info, None) }.map_err(failed("create command pool"))?;
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(commands.pool).command_buffer_count(1);
+        // SAFETY: the pool was just made and is used by this thread alone.
+        let buffers = unsafe { raw.allocate_command_buffers(&info) }.map_err(failed("allocate commands"))?;
+        commands.buffer = buffers[0];
+        // SAFETY: a valid description.
+        commands.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
+            .map_err(failed("create fence"))?;
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the command buffer is fresh.
+        unsafe { raw.begin_command_buffer(commands.buffer, &begin) }.map_err(failed("begin commands"))?;
+        if most_timed > 0 {
+            commands.begin_timestamps()?;
+        }
+        Ok(commands)
+    }
+
+    fn begin_timestamps(&mut self) -> Result<()> {
+        let count = self.most_timed as u32 + 1;
+        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count);
+        // SAFETY: the queue has timestamps.
+        self.timestamps = unsafe { self.device.raw.create_query_pool(&info, None) }
+            .map_err(failed("create timestamp pool"))?;
+        self.device.set_name(self.timestamps, "timestamps");
+        // SAFETY: recording; all queries of the pool.
+        unsafe { self.device.raw.cmd_reset_query_pool(self.buffer, self.timestamps, 0, count) };
+        self.write_timestamp(0);
+        Ok(())
+    }
+
+    fn write_timestamp(&self, index: u32) {
+        let stage = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
+        // SAFETY: recording; the query was reset and is written once.
+        unsafe { self.device.raw.cmd_write_timestamp(self.buffer, stage, self.timestamps, index) };
+    }
+
+    /// Makes all slots visible to the dispatches that follow.
+    pub fn bind(&mut self, kernel: &Kernel, bindings: &Bindings) {
+        let point = vk::PipelineBindPoint::COMPUTE;
+        let (layout, sets) = (kernel.layout(), [bindings.set]);
+        // SAFETY: recording; set and pipeline layout are of the same Layout.
+        unsafe { self.device.raw.cmd_bind_descriptor_sets(self.buffer, point, layout, 0, &sets, &[]) };
+    }
+
+    /// Runs `groups` workgroups.
+    pub fn dispatch(&mut self, kernel: &Kernel, push: &[u8], groups: u32) {
+        self.labelled(kernel, push, |commands| {
+            // SAFETY: recording; pipeline, set and push constants are bound; groups ≤ 65 535 by the caller's bands.
+            unsafe { commands.device.raw.cmd_dispatch(commands.buffer, groups, 1, 1) };
+        });
+    }
+
+    /// Runs as many workgroups as the `index`-th triple of `arguments` says by then.
+    pub fn dispatch_indirect(&mut self, kernel: &Kernel, push: &[u8], arguments: &Buffer, index: u64) {
+        self.labelled(kernel, push, |commands| {
+            let offset = index * size_of::<vk::DispatchIndirectCommand>() as u64;
+            // SAFETY: recording; the buffer has indirect usage and room for the triple.
+            unsafe { commands.device.raw.cmd_dispatch_indirect(commands.buffer, arguments.raw, offset) };
+        });
+    }
+
+    /// A dispatch with its debug label, pipeline, push constants and timestamp.
+    fn labelled(&mut self, kernel: &Kernel, push: &[u8], dispatch: impl FnOnce(&Self)) {
+        if let (Some(utils), Ok(name)) = (&self.device.utils, CString::new(kernel.name)) {
+            let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
+            // SAFETY: recording; the label's name lives until the call returns.
+            unsafe { utils.cmd_begin_debug_utils_label(self.buffer, &label) };
+        }
+        let point = vk::PipelineBindPoint::COMPUTE;
+        // SAFETY: recording; the pipeline is alive until the commands were waited for.
+        unsafe { self.device.raw.cmd_bind_pipeline(self.buffer, point, kernel.raw) };
+        let stage = vk::ShaderStageFlags::COMPUTE;
+        // SAFETY: recording; the bytes are exactly the layout's push constants.
+        unsafe { self.device.raw.cmd_push_constants(self.buffer, kernel.layout(), stage, 0, push) };
+        dispatch(self);
+        if self.timed.len() < self.most_timed {
+            self.timed.push(kernel.name);
+            self.write_timestamp(self.timed.len() as u32);
+        }
+        if let Some(utils) = &self.device.utils {
+            // SAFETY: recording; ends the label begun above.
+            unsafe { utils.cmd_end_debug_utils_label(self.buffer) };
+        }
+    }
+
+    /// What follows may touch, as `after` says, what came before has written, as `before` says.
+    pub fn barrier(&mut self, before: Access, after: Access) {
+        let memory =
+            [vk::MemoryBarrier::default().src_access_mask(before.flags()).dst_access_mask(after.flags())];
+        let (from, to) = (before.stage(), after.stage());
+        let flags = vk::DependencyFlags::empty();
+        // SAFETY: recording; stages and accesses match each other.
+        unsafe { self.device.raw.cmd_pipeline_barrier(self.buffer, from, to, flags, &memory, &[], &[]) };
+    }
+
+    /// Sets all of a buffer to zero.
+    pub fn clear(&mut self, buffer: &Buffer) {
+        // SAFETY: recording; the buffer has transfer usage and its size is a multiple of 4.
+        unsafe { self.device.raw.cmd_fill_buffer(self.buffer, buffer.raw, 0, vk::WHOLE_SIZE, 0) };
+    }
+
+    /// Copies the first `bytes`.
+    pub fn copy(&mut self, from: &Buffer, to: &Buffer, bytes: u64) {
+        let region = [vk::BufferCopy::default().size(bytes)];
+        // SAFETY: recording; both buffers are alive, have transfer usage and at least this size.
+        unsafe { self.device.raw.cmd_copy_buffer(self.buffer, from.raw, to.raw, &region) };
+    }
+
+    /// Runs what was recorded, waits, and returns each timed dispatch's name and milliseconds, in order.
+    ///
+    /// # Errors
+    /// `Vulkan` when the device is lost or out of memory.
+    pub fn submit_and_wait(self) -> Result<Vec<(&'static str, f64)>> {
+        let raw = &self.device.raw;
+        // SAFETY: recording, and ended once.
+        unsafe { raw.end_command_buffer(self.buffer) }.map_err(failed("end commands"))?;
+        let buffers = [self.buffer];
+        let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
+        // SAFETY: the queue is used by one thread at a time; fence and commands are fresh.
+        unsafe { raw.queue_submit(self.device.queue, &submit, self.fence) }.map_err(failed("submit"))?;
+        // SAFETY: the fence was just submitted.
+        unsafe { raw.wait_for_fences(&[self.fence], true, u64::MAX) }.map_err(failed("wait for the device"))?;
+        self.read_timestamps()
+    }
+
+    fn read_timestamps(&self) -> Result<Vec<(&'static str, f64)>> {
+        let Some(period) = self.device.timestamp_period.filter(|_| self.most_timed > 0) else {
+            return Ok(Vec::new());
+        };
+        let mut ticks = vec![0_u64; self.timed.len() + 1];
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+        // SAFETY: the queries were written by commands that have completed.
+        unsafe { self.device.raw.get_query_pool_results(self.timestamps, 0, &mut ticks, flags) }
+            .map_err(failed("read timestamps"))?;
+        let spans = ticks.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * period * 1e-6);
+        Ok(self.timed.iter().copied().zip(spans).collect())
+    }
+}
+
+impl Drop for Commands {
+    fn drop(&mut self) {
+        let raw = &self.device.raw;
+        // SAFETY: submitted commands were waited for, or were never submitted; null is allowed here and below.
+        unsafe { raw.destroy_query_pool(self.timestamps, None) };
+        // SAFETY: as above.
+        unsafe { raw.destroy_fence(self.fence, None) };
+        // SAFETY: as above; frees the command buffer too.
+        unsafe { raw.destroy_command_pool(self.pool, None) };
+    }
+}

@@ -1,0 +1,302 @@
+//! Choosing a physical device and opening it: one compute queue, memory, limits.
+
+use super::{failed, Instance};
+use crate::error::{Error, Result};
+use ash::{ext::debug_utils, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use std::mem::ManuallyDrop;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Texel buffers smaller than this push a device to storage buffers: SwiftShader and some phones offer 65 536 texels.
+const ENOUGH_TEXELS: u32 = 1 << 26;
+
+/// What kind of thing the device is; in the order of preference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DeviceKind {
+    /// A GPU of its own.
+    Discrete,
+    /// A GPU that shares the CPU's memory.
+    Integrated,
+    /// A part of a GPU.
+    Virtual,
+    /// Software.
+    Cpu,
+    /// Anything else.
+    Other,
+}
+
+impl DeviceKind {
+    /// Lower-case name, as `--json` prints it.
+    pub fn name(self) -> &'static str {
+        match self {
+            DeviceKind::Discrete => "discrete",
+            DeviceKind::Integrated => "integrated",
+            DeviceKind::Virtual => "virtual",
+            DeviceKind::Cpu => "cpu",
+            DeviceKind::Other => "other",
+        }
+    }
+}
+
+/// Which device to open.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum DeviceChoice {
+    /// The best usable one: discrete, then integrated, then virtual, then software.
+    #[default]
+    Best,
+    /// By its index in [`Device::list`], or by a part of its name, in any case.
+    Named(String),
+}
+
+/// What a physical device says of itself.
+#[derive(Clone, Debug)]
+pub struct DeviceInfo {
+    /// Name, e.g. `llvmpipe (LLVM 15.0.6, 256 bits)`.
+    pub name: String,
+    /// Driver's name and version, e.g. `llvmpipe Mesa 22.3.6 (LLVM 15.0.6)`.
+    pub driver: String,
+    /// Vulkan version, e.g. `1.3.230`.
+    pub api: String,
+    /// Kind.
+    pub kind: DeviceKind,
+    /// Invocations in a subgroup; nothing depends on it.
+    pub subgroup_size: u32,
+    /// Most `uvec4` texels in a texel buffer.
+    pub max_texels: u32,
+    /// Most bytes in a storage buffer binding.
+    pub max_storage_bytes: u64,
+    /// Why it cannot be used, if it cannot.
+    pub unusable: Option<String>,
+}
+
+/// Through which kind of buffer kernels fetch the tree and the triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fetch {
+    /// Uniform texel buffers.
+    Texel,
+    /// Storage buffers.
+    Storage,
+}
+
+/// An open device with one compute queue.
+pub struct Device {
+    pub(super) raw: ash::Device,
+    pub(super) queue: vk::Queue,
+    pub(super) queue_family: u32,
+    pub(super) utils: Option<debug_utils::Device>,
+    /// Freed by hand before the device is destroyed.
+    allocator: ManuallyDrop<Mutex<Allocator>>,
+    /// Nanoseconds a timestamp tick; `None` when the queue has no timestamps.
+    pub(super) timestamp_period: Option<f64>,
+    /// Bytes allocated now and at most.
+    pub(super) memory: Mutex<MemoryCount>,
+    /// What was opened.
+    pub info: DeviceInfo,
+    /// How kernels fetch on this device.
+    pub fetch: Fetch,
+    /// The instance, for its validation messages.
+    pub instance: Arc<Instance>,
+}
+
+/// Bytes of device memory that buffers hold.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MemoryCount {
+    pub(super) now: u64,
+    pub(super) peak: u64,
+}
+
+impl Device {
+    /// All physical devices, in the loader's order, usable or not.
+    ///
+    /// # Errors
+    /// `NoDevice` when there is no loader or no driver.
+    pub fn list(instance: &Instance) -> Result<Vec<DeviceInfo>> {
+        Ok(instance.physical_devices()?.into_iter().map(|device| describe(instance, device)).collect())
+    }
+
+    /// Opens a device.
+    ///
+    /// # Errors
+    /// `NoDevice` when none fits the choice; `Vulkan` when the driver refuses.
+    pub fn open(instance: &Arc<Instance>, choice: &DeviceChoice) -> Result<Arc<Self>> {
+        let physical = instance.physical_devices()?;
+        let infos: Vec<DeviceInfo> = physical.iter().map(|device| describe(instance, *device)).collect();
+        let index = choose(&infos, choice)?;
+        Self::open_physical(instance, physical[index], infos[index].clone())
+    }
+
+    fn open_physical(
+        instance: &Arc<Instance>,
+        physical: vk::PhysicalDevice,
+        info: DeviceInfo,
+    ) -> Result<Arc<Self>> {
+        let (queue_family, timestamp_bits) = compute_family(instance, physical)
+            .ok_or_else(|| Error::NoDevice(format!("{} has no compute queue", info.name)))?;
+        let queues = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(queue_family)
+            .queue_priorities(&[1.0])];
+        let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true);
+        let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut vulkan12);
+        // SAFETY: the physical device belongs to the instance; queue family and feature were asked for and are there.
+        let raw = unsafe { instance.raw.create_device(physical, &create, None) }
+            .map_err(failed(format!("open device {}", info.name)))?;
+        // SAFETY: one queue of this family was made with the device.
+        let queue = unsafe { raw.get_device_queue(queue_family, 0) };
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: raw.clone(),
+            physical_device: physical,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            allocation_sizes: Default::default(),
+        });
+        let allocator = allocator.map_err(|error| {
+            // SAFETY: nothing was made from the device yet.
+            unsafe { raw.destroy_device(None) };
+            Error::NoDevice(format!("{}: memory allocator: {error}", info.name))
+        })?;
+        let utils = instance.has_debug_utils.then(|| debug_utils::Device::new(&instance.raw, &raw));
+        // SAFETY: the physical device belongs to the instance.
+        let properties = unsafe { instance.raw.get_physical_device_properties(physical) };
+        let fetch = if info.max_texels >= ENOUGH_TEXELS { Fetch::Texel } else { Fetch::Storage };
+        Ok(Arc::new(Self {
+            raw,
+            queue,
+            queue_family,
+            utils,
+            allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            timestamp_period: (timestamp_bits > 0).then_some(f64::from(properties.limits.timestamp_period)),
+            memory: Mutex::default(),
+            info,
+            fetch,
+            instance: instance.clone(),
+        }))
+    }
+
+    /// Most bytes of device memory that buffers have held at once.
+    pub fn peak_memory(&self) -> u64 {
+        lock(&self.memory).peak
+    }
+
+    pub(super) fn allocator(&self) -> MutexGuard<'_, Allocator> {
+        lock(&self.allocator)
+    }
+
+    /// Gives an object the name that tools and validation messages show.
+    pub(super) fn set_name<H: vk::Handle>(&self, handle: H, name: &str) {
+        let Some(utils) = &self.utils else { return };
+        let Ok(name) = std::ffi::CString::new(name) else { return };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+        // SAFETY: the handle is alive and of this device. A name that cannot be set costs nothing but the name.
+        let _ = unsafe { utils.set_debug_utils_object_name(&info) };
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: never used again; every buffer held an Arc of this device, so all memory has been returned.
+        unsafe { ManuallyDrop::drop(&mut self.allocator) };
+        // SAFETY: every object of the device held an Arc of it, so none is left, and every submission was waited for.
+        unsafe { self.raw.destroy_device(None) };
+    }
+}
+
+/// A poisoned lock only means that another thread panicked: the counters behind it are still right.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The first queue family that computes, and its timestamp bits.
+fn compute_family(instance: &Instance, physical: vk::PhysicalDevice) -> Option<(u32, u32)> {
+    // SAFETY: the physical device belongs to the instance.
+    let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
+    let index = families.iter().position(|family| family.queue_flags.contains(vk::QueueFlags::COMPUTE))?;
+    Some((u32::try_from(index).ok()?, families[index].timestamp_valid_bits))
+}
+
+fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> DeviceInfo {
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+    let mut properties =
+        vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup);
+    // SAFETY: the physical device belongs to the instance; the chain is of structures this query fills.
+    unsafe { instance.raw.get_physical_device_properties2(physical, &mut properties) };
+    let core = properties.properties;
+    let text = |chars: Result<&std::ffi::CStr, _>| {
+        chars.map(|chars: &std::ffi::CStr| chars.to_string_lossy().into_owned()).unwrap_or_default()
+    };
+    let api = core.api_version;
+    let mut info = DeviceInfo {
+        name: text(core.device_name_as_c_str().map_err(drop)),
+        driver: format!(
+            "{} {}",
+            text(driver.driver_name_as_c_str().map_err(drop)),
+            text(driver.driver_info_as_c_str().map_err(drop))
+        ),
+        api: format!(
+            "{}.{}.{}",
+            vk::api_version_major(api),
+            vk::api_version_minor(api),
+            vk::api_version_patch(api)
+        ),
+        kind: match core.device_type {
+            vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
+            vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
+            vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
+            vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
+            _ => DeviceKind::Other,
+        },
+        subgroup_size: subgroup.subgroup_size,
+        max_texels: core.limits.max_texel_buffer_elements,
+        max_storage_bytes: core.limits.max_storage_buffer_range.into(),
+        unusable: None,
+    };
+    info.unusable = unusable(instance, physical, api);
+    info
+}
+
+/// What a device lacks, if anything.
+fn unusable(instance: &Instance, physical: vk::PhysicalDevice, api: u32) -> Option<String> {
+    if api < vk::API_VERSION_1_2 {
+        return Some("it offers less than Vulkan 1.2".into());
+    }
+    if compute_family(instance, physical).is_none() {
+        return Some("it has no compute queue".into());
+    }
+    let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan12);
+    // SAFETY: the physical device belongs to the instance and has Vulkan 1.2, which defines the chained structure.
+    unsafe { instance.raw.get_physical_device_features2(physical, &mut features) };
+    (vulkan12.scalar_block_layout == vk::FALSE).then(|| "it has no scalarBlockLayout".into())
+}
+
+/// Index of the device that fits the choice.
+fn choose(infos: &[DeviceInfo], choice: &DeviceChoice) -> Result<usize> {
+    let listed = || {
+        let lines = infos.iter().enumerate().map(|(index, info)| format!("{index}: {}", info.name));
+        lines.collect::<Vec<_>>().join("; ")
+    };
+    let index = match choice {
+        DeviceChoice::Best => (0..infos.len())
+            .filter(|index| infos[*index].unusable.is_none())
+            .min_by_key(|index| infos[*index].kind)
+            .ok_or_else(|| {
+                let reasons = infos
+                    .iter()
+                    .map(|info| format!("{}: {}", info.name, info.unusable.as_deref().unwrap_or("")));
+                Error::NoDevice(format!("no usable Vulkan device: {}", reasons.collect::<Vec<_>>().join("; ")))
+            })?,
+        DeviceChoice::Named(name) => {
+            let wanted = name.to_lowercase();
+            let by_index = name.parse::<usize>().ok().filter(|index| *index < infos.len());
+            let by_name = || infos.iter().position(|info| info.name.to_lowercase().contains(&wanted));
+            by_index.or_else(by_name).ok_or_else(|| {
+                Error::NoDevice(format!("no device '{name}'; there is {}", listed()))
+            })?
+        }
+    };
+    match &infos[index].unusable {
+        Some(reason) => Err(Error::NoDevice(format!("{} cannot be used: {reason}", infos[index].name))),
+        None => Ok(index),
+    }
+}
