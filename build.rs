@@ -14,8 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
     let contract = |name: &str, translate: fn(&str) -> Result<String, translate::Unknown>| {
         let source = fs::read_to_string(format!("shaders/shared/{name}.glsl"))?;
-        let rust = translate(&source)
-            .map_err(|unknown| format!("not in the contract's subset: {}", unknown.0))?;
+        let rust = translate(&source).map_err(|unknown| format!("not in the contract's subset: {}", unknown.0))?;
         fs::write(out.join(format!("{name}.rs")), rust)?;
         Ok::<(), Box<dyn Error>>(())
     };
@@ -27,9 +26,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Compiles every kernel and writes `kernels.rs`, their list.
 fn compile_kernels(out: &Path) -> Result<(), Box<dyn Error>> {
-    let mut kernels: Vec<PathBuf> = fs::read_dir("shaders")?
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<Result<_, _>>()?;
+    let mut kernels: Vec<PathBuf> =
+        fs::read_dir("shaders")?.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
     kernels.retain(|path| path.extension().is_some_and(|extension| extension == "comp"));
     kernels.sort();
     let compiler = shaderc::Compiler::new()?;
@@ -53,11 +51,7 @@ fn compile_kernels(out: &Path) -> Result<(), Box<dyn Error>> {
     Ok(fs::write(out.join("kernels.rs"), list)?)
 }
 
-fn compile(
-    compiler: &shaderc::Compiler,
-    path: &Path,
-    fetch_from_storage: bool,
-) -> Result<Vec<u8>, Box<dyn Error>> {
+fn compile(compiler: &shaderc::Compiler, path: &Path, fetch_from_storage: bool) -> Result<Vec<u8>, Box<dyn Error>> {
     let mut options = shaderc::CompileOptions::new()?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
     options.set_optimization_level(shaderc::OptimizationLevel::Performance);
@@ -74,7 +68,6 @@ fn compile(
     }
     let source = fs::read_to_string(path)?;
     let file = path.display().to_string();
-    let artifact =
-        compiler.compile_into_spirv(&source, shaderc::ShaderKind::Compute, &file, "main", Some(&options))?;
+    let artifact = compiler.compile_into_spirv(&source, shaderc::ShaderKind::Compute, &file, "main", Some(&options))?;
     Ok(artifact.as_binary_u8().to_vec())
 }

@@ -1,9 +1,41 @@
-//! x
-pub mod layout;
-pub mod error;
-pub mod vulkan;
+//! A headless Vulkan ray tracer for glTF scenes: one picture on every device, GPU or none.
+//!
+//! ```
+//! use glimt::{render, scene, Options};
+//! let scene = scene::built_in("table")?;
+//! let (film, report) = render(&scene, &Options { size: (64, 48), ..Options::default() })?;
+//! assert_eq!((film.width, film.height), (64, 48));
+//! println!("{} rays on {}", report.rays.primary, report.device.name);
+//! # Ok::<(), glimt::Error>(())
+//! ```
+//!
+//! # The data's path
+//! ```text
+//! scene.glb ─scene::gltf→ Scene ─┬─ Soup ──→ boxes ─bvh→ Bvh ──→ quantised records ─┐
+//!                                ├─ View (camera, lights, size)                     ├─ render::upload → device buffers
+//!                                └─ Features → specialization constants, passes, buffers (render::Plan)
+//! buffers ─render::frame→ primary → per round { prepare → shade → prepare → shadow; reflection } → resolve → Film → file
+//! ```
+//! # Rooms, and who may know whom
+//! ```text
+//! main → cli → everything below       render → scene, bvh, vulkan, layout, film, report, error
+//! reference → scene, film, error      scene → error, layout (features only)       bvh → layout, error
+//! vulkan → error      film → error      layout, report, error → nothing
+//! ```
+//! All `unsafe` lives in [`vulkan`]. What host and device share is declared once, in `shaders/shared/`, see [`layout`].
+
 pub mod bvh;
-pub mod scene;
-pub mod report;
+pub mod error;
 pub mod film;
+pub mod layout;
+pub mod reference;
 pub mod render;
+pub mod report;
+pub mod scene;
+pub mod vulkan;
+
+pub use error::{Error, Result};
+pub use film::Film;
+pub use render::{render, Options, Renderer};
+pub use report::Report;
+pub use scene::Scene;

@@ -24,11 +24,11 @@ uint permute(uint index, uint count, uint seed) {
     do {
         index = (index + seed) & mask;
         index = (index * (seed | 1u)) & mask;
-        index ^= (index & mask) >> 3u;
+        index ^= index >> 3u;
         index = (index * 0x9e3779b1u) & mask;
-        index ^= (index & mask) >> 5u;
+        index ^= index >> 5u;
         index = (index * (pcg(seed) | 1u)) & mask;
-        index ^= (index & mask) >> 2u;
+        index ^= index >> 2u;
     } while (index >= count);
     return index;
 }

@@ -51,7 +51,9 @@ fn build_subtree(items: &mut [Item], first: usize, depth: u32, nodes: &mut Vec<N
             || build_subtree(right, first + middle, depth + 1, &mut right_nodes),
         );
         let at = nodes.len() as u32;
-        nodes.extend(right_nodes.into_iter().map(|node| Node { children: node.children.map(|child| moved(child, at)), ..node }));
+        nodes.extend(
+            right_nodes.into_iter().map(|node| Node { children: node.children.map(|child| moved(child, at)), ..node }),
+        );
         (left, (right.0, moved(right.1, at)))
     } else {
         (build_subtree(left, first, depth + 1, nodes), build_subtree(right, first + middle, depth + 1, nodes))
@@ -82,7 +84,7 @@ fn split(items: &mut [Item], bounds: &Aabb, depth: u32) -> Option<usize> {
     let centers = Aabb::of(items.iter().map(|item| item.bounds.doubled_center()));
     let Some(plane) = cheapest_plane(items, &centers) else {
         // All centres coincide.
-        return (count > LEAF).then(|| count / 2);
+        return (count > LEAF).then_some(count / 2);
     };
     let leaf_cost = count as f32;
     let split_cost = VISIT_COST + plane.cost / bounds.half_area().max(f32::MIN_POSITIVE);
@@ -90,7 +92,11 @@ fn split(items: &mut [Item], bounds: &Aabb, depth: u32) -> Option<usize> {
         return None;
     }
     let middle = partition(items, |item| plane.bin_of(item) <= plane.last_left);
-    if middle == 0 || middle == count { Some(halve(items)) } else { Some(middle) }
+    if middle == 0 || middle == count {
+        Some(halve(items))
+    } else {
+        Some(middle)
+    }
 }
 
 /// Halves by the centres along their longest axis.
@@ -99,7 +105,13 @@ fn halve(items: &mut [Item]) -> usize {
         let centers = Aabb::of(items.iter().map(|item| item.bounds.doubled_center()));
         centers.hi - centers.lo
     };
-    let axis = if size.x >= size.y && size.x >= size.z { 0 } else if size.y >= size.z { 1 } else { 2 };
+    let axis = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
     let middle = items.len() / 2;
     let key = |item: &Item| item.bounds.doubled_center()[axis];
     items.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)).then(a.primitive.cmp(&b.primitive)));

@@ -70,9 +70,10 @@ pub fn quantise(bvh: &Bvh, reach: Vec3) -> Quantised {
         };
         [lo.x | lo.y << 16, lo.z | hi.x << 16, hi.y | hi.z << 16, reference]
     };
-    let records = bvh.nodes.par_iter().flat_map_iter(|node| {
-        [record(&node.bounds[0], &node.children[0]), record(&node.bounds[1], &node.children[1])]
-    });
+    let records = bvh
+        .nodes
+        .par_iter()
+        .flat_map_iter(|node| [record(&node.bounds[0], &node.children[0]), record(&node.bounds[1], &node.children[1])]);
     Quantised { records: records.collect(), grid }
 }
 
@@ -115,7 +116,10 @@ mod tests {
                 for (bounds, [x, y, z, _]) in node.bounds.iter().zip(records) {
                     let lo = world([x & 0xffff, x >> 16, y & 0xffff]);
                     let hi = world([y >> 16, z & 0xffff, z >> 16]);
-                    assert!(lo.cmplt(bounds.lo.as_dvec3()).all() && hi.cmpgt(bounds.hi.as_dvec3()).all(), "reach {reach}: {lo} {hi} {bounds:?}");
+                    assert!(
+                        lo.cmplt(bounds.lo.as_dvec3()).all() && hi.cmpgt(bounds.hi.as_dvec3()).all(),
+                        "reach {reach}: {lo} {hi} {bounds:?}"
+                    );
                 }
             }
         }

@@ -69,12 +69,9 @@ pub fn compare(reference: &Film, test: &Film) -> Result<Metrics> {
     }
     let pixels = reference.pixels.len() as f64;
     let rmse = (squares / (3.0 * pixels)).sqrt();
-    let similarity = image_compare::rgb_similarity_structure(
-        &image_compare::Algorithm::MSSIMSimple,
-        &rgb8(reference),
-        &rgb8(test),
-    )
-    .map_err(|error| Error::Usage(format!("structural similarity: {error}")))?;
+    let similarity =
+        image_compare::rgb_similarity_structure(&image_compare::Algorithm::MSSIMSimple, &rgb8(reference), &rgb8(test))
+            .map_err(|error| Error::Usage(format!("structural similarity: {error}")))?;
     let flip = flip_map(reference, test);
     Ok(Metrics {
         rmse,

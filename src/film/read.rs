@@ -21,7 +21,11 @@ pub fn read(path: &Path) -> Result<Film> {
     // EXR stores colour times alpha, like the film; PNG and WebP do not.
     let pixel = |pixel: &image::Rgba<f32>| {
         let [r, g, b, a] = pixel.0;
-        if linear { [r, g, b, a] } else { [decode(r) * a, decode(g) * a, decode(b) * a, a] }
+        if linear {
+            [r, g, b, a]
+        } else {
+            [decode(r) * a, decode(g) * a, decode(b) * a, a]
+        }
     };
     Ok(Film { width, height, pixels: image.pixels().map(pixel).collect(), has_alpha })
 }

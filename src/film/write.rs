@@ -42,9 +42,33 @@ impl Format {
             (Some("exr"), 8) => Ok(Format::Exr),
             (Some("hdr"), 8) => Ok(Format::Hdr),
             (Some("exr" | "hdr"), _) => Err(Error::Usage("--bits 16 is for PNG; EXR and HDR are always float".into())),
-            _ => Err(Error::Usage(format!("cannot tell the format of {}: end it in .png, .exr or .hdr", path.display()))),
+            _ => {
+                Err(Error::Usage(format!("cannot tell the format of {}: end it in .png, .exr or .hdr", path.display())))
+            }
         }
     }
+}
+
+/// A temporary file beside the target, removed again unless it is renamed.
+fn temporary(path: &Path) -> Result<tempfile::NamedTempFile> {
+    if path.is_dir() {
+        return Err(Error::write(path, "it is a folder"));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".glimt-");
+    // Temporary files are private by default; a picture is as public as any new file (the umask still applies).
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder).map_err(|error| Error::write(path, error.to_string()))
+}
+
+/// Finds out, before any work is done, whether a picture could be written there.
+///
+/// # Errors
+/// `Write` when not.
+pub fn check_writable(path: &Path) -> Result<()> {
+    temporary(path).map(drop)
 }
 
 impl Film {
@@ -54,12 +78,7 @@ impl Film {
     /// # Errors
     /// `Write` when that fails; `Usage` when the format cannot hold the picture; whatever `may_finish` answers.
     pub fn save(&self, path: &Path, format: Format, may_finish: impl FnOnce() -> Result<()>) -> Result<Saved> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut file = tempfile::Builder::new()
-            .prefix(".glimt-")
-            .permissions(output_permissions())
-            .tempfile_in(folder)
-            .map_err(|error| Error::write(path, error))?;
+        let mut file = temporary(path)?;
         let mut writer = BufWriter::new(file.as_file_mut());
         let saved = self.encode(&mut writer, format, path)?;
         writer.flush().map_err(|error| Error::write(path, error))?;
@@ -86,7 +105,10 @@ impl Film {
                 let deep = format == Format::Png16;
                 let bytes: Vec<u8> = if deep {
                     let sample = |value: f32| ((value * 65535.0 + 0.5) as u16).to_ne_bytes();
-                    pixels.into_par_iter().flat_map_iter(|i| self.srgb(i).into_iter().take(channels).flat_map(sample)).collect()
+                    pixels
+                        .into_par_iter()
+                        .flat_map_iter(|i| self.srgb(i).into_iter().take(channels).flat_map(sample))
+                        .collect()
                 } else {
                     pixels.into_par_iter().flat_map_iter(|i| self.srgb8(i).into_iter().take(channels)).collect()
                 };
@@ -112,7 +134,9 @@ impl Film {
             }
             Format::Hdr => {
                 if self.has_alpha {
-                    return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
+                    return Err(Error::Usage(
+                        "Radiance HDR has no alpha: write a transparent picture as .png or .exr".into(),
+                    ));
                 }
                 let rgb: Vec<Rgb<f32>> = self.pixels.iter().map(|[r, g, b, _]| Rgb([*r, *g, *b])).collect();
                 let samples: Vec<f32> = rgb.iter().flat_map(|pixel| pixel.0).collect();
@@ -127,15 +151,4 @@ impl Film {
 /// Lower-case hexadecimal SHA-256.
 fn digest(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// Temporary files are private by default; a picture is as public as any new file (the umask still applies).
-#[cfg(unix)]
-fn output_permissions() -> std::fs::Permissions {
-    std::os::unix::fs::PermissionsExt::from_mode(0o666)
-}
-
-#[cfg(not(unix))]
-fn output_permissions() -> std::fs::Permissions {
-    std::fs::metadata(".").map_or_else(|_| unreachable!("the current folder has permissions"), |data| data.permissions())
 }

@@ -31,11 +31,7 @@ fn is_passive(line: &str) -> bool {
 }
 
 /// Walks over declarations with their `///` comments: `declare(line, doc)` writes Rust or returns `None` for an unknown line.
-fn walk(
-    file: &str,
-    source: &str,
-    mut declare: impl FnMut(&str, &str) -> Option<()>,
-) -> Result<(), Unknown> {
+fn walk(file: &str, source: &str, mut declare: impl FnMut(&str, &str) -> Option<()>) -> Result<(), Unknown> {
     let mut doc = String::new();
     for (index, raw) in source.lines().enumerate() {
         let line = raw.trim();
@@ -68,10 +64,7 @@ pub fn layout(source: &str) -> Result<String, Unknown> {
             let known = structs.iter().find(|known| *known == kind).cloned();
             let kind = rust_type(kind).map(str::to_owned).or(known)?;
             writeln!(out, "    /// {doc}\n    pub {name}: {kind},").ok()
-        } else if let Some(name) = line
-            .strip_prefix("struct ")
-            .and_then(|rest| rest.strip_suffix(" {"))
-        {
+        } else if let Some(name) = line.strip_prefix("struct ").and_then(|rest| rest.strip_suffix(" {")) {
             inside = true;
             structs.push(name.to_owned());
             writeln!(out, "/// {doc}\n#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\n#[repr(C)]\npub struct {name} {{").ok()

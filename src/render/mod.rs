@@ -153,7 +153,8 @@ impl Renderer {
         let plan = Plan::new(scene, soup, view, *features, bvh.nodes.len(), options.samples_in_flight);
         let start = Instant::now();
         let quantised = quantise(bvh, (view.camera.eye - center).abs().as_vec3());
-        let frame = frame::Frame::new(self, upload::Scene { scene, soup, view, bvh, quantised: &quantised, center }, plan)?;
+        let frame =
+            frame::Frame::new(self, upload::Scene { scene, soup, view, bvh, quantised: &quantised, center }, plan)?;
         let upload = milliseconds(start);
         let start = Instant::now();
         let (film, outcome) = frame.run(options)?;
@@ -205,11 +206,8 @@ pub fn describe(scene: &Scene, soup: &Soup, view: &View) -> report::Scene {
 pub fn build_tree(soup: &Soup) -> (Bvh, glam::DVec3) {
     use rayon::prelude::*;
     let center = soup.center();
-    let boxes: Vec<Aabb> = soup
-        .positions
-        .par_iter()
-        .map(|corners| Aabb::of(corners.map(|corner| (corner - center).as_vec3())))
-        .collect();
+    let boxes: Vec<Aabb> =
+        soup.positions.par_iter().map(|corners| Aabb::of(corners.map(|corner| (corner - center).as_vec3()))).collect();
     (Bvh::build(&boxes), center)
 }
 

@@ -119,10 +119,20 @@ impl Plan {
         let (shadows, reflections) = (self.features.shadows, self.features.reflections);
         pass("primary", 1, "camera rays → nearest hits or background");
         // Hits before each round; after each light its shadow rays, after the last one the reflected rays too.
-        let after_shading = if shadows { rounds * lights } else if reflections { rounds - 1 } else { 0 };
+        let after_shading = if shadows {
+            rounds * lights
+        } else if reflections {
+            rounds - 1
+        } else {
+            0
+        };
         pass("prepare", rounds + after_shading, "queue counts → dispatch arguments");
         pass("shade", rounds * lights, "ambient, emission, one light each → shadow and reflection queues");
-        pass("shadow", if shadows { rounds * lights } else { 0 }, "shadow rays → the light's part, where nothing blocks it");
+        pass(
+            "shadow",
+            if shadows { rounds * lights } else { 0 },
+            "shadow rays → the light's part, where nothing blocks it",
+        );
         pass("reflection", if reflections { rounds - 1 } else { 0 }, "reflected rays → nearest hits or background");
         pass("resolve", 1, "samples → pixels");
     }

@@ -78,7 +78,8 @@ impl FromStr for Background {
             let [_, r, g, b] = number.to_be_bytes();
             return Ok(Background::Constant(DVec3::new(linear(r), linear(g), linear(b))));
         }
-        let parts: Vec<f64> = text.split(',').map(|part| part.trim().parse().map_err(|_| bad())).collect::<Result<_>>()?;
+        let parts: Vec<f64> =
+            text.split(',').map(|part| part.trim().parse().map_err(|_| bad())).collect::<Result<_>>()?;
         match parts[..] {
             [r, g, b] if [r, g, b].iter().all(|value| (0.0..=1e30).contains(value)) => {
                 Ok(Background::Constant(DVec3::new(r, g, b)))

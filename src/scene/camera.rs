@@ -75,7 +75,8 @@ impl Camera {
         if !eye.is_finite() {
             return Err(Error::Usage("the camera's position is not finite".into()));
         }
-        let forward = forward.try_normalize().ok_or_else(|| bad("it does not look anywhere (eye and target coincide)"))?;
+        let forward =
+            forward.try_normalize().ok_or_else(|| bad("it does not look anywhere (eye and target coincide)"))?;
         let up_hint = up.try_normalize().ok_or_else(|| bad("its up vector has no direction"))?;
         let right = forward.cross(up_hint);
         if right.length() < 1e-9 {

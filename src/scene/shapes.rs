@@ -6,7 +6,12 @@ use std::f64::consts::{PI, TAU};
 
 /// A square of four corners A B C D, counter-clockwise: the triangles A B C and A C D.
 pub fn square(corners: [Vec3; 4]) -> Mesh {
-    Mesh { name: "square".into(), positions: corners.to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
+    Mesh {
+        name: "square".into(),
+        positions: corners.to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    }
 }
 
 /// The unit square in the plane y = 0, from −½ to ½, facing up.
@@ -37,7 +42,8 @@ pub fn sphere(rings: u32) -> Mesh {
     let around = 2 * rings;
     let mut mesh = Mesh { name: "sphere".into(), ..Mesh::default() };
     for ring in 0..=rings {
-        let (height, radius) = ((PI * f64::from(ring) / f64::from(rings)).cos(), (PI * f64::from(ring) / f64::from(rings)).sin());
+        let (height, radius) =
+            ((PI * f64::from(ring) / f64::from(rings)).cos(), (PI * f64::from(ring) / f64::from(rings)).sin());
         for step in 0..around {
             let angle = TAU * f64::from(step) / f64::from(around);
             let point = glam::DVec3::new(radius * angle.sin(), height, radius * angle.cos()).as_vec3();

@@ -83,7 +83,11 @@ fn patches() -> Vec<Patch> {
                     DVec3::new(x1, 0.0, z1),
                 ];
                 // The mirrored half runs the other way round, so that both look outward.
-                if side > 0.0 { row } else { [row[3], row[2], row[1], row[0]] }
+                if side > 0.0 {
+                    row
+                } else {
+                    [row[3], row[2], row[1], row[0]]
+                }
             }));
         }
     }
@@ -134,7 +138,8 @@ pub fn teapot(steps: u32) -> Mesh {
         let first = mesh.positions.len() as u32;
         for i in 0..=steps {
             for j in 0..=steps {
-                let (point, normal) = evaluate(&patch, f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
+                let (point, normal) =
+                    evaluate(&patch, f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
                 mesh.positions.push(y_up(point));
                 mesh.normals.push(y_up(normal));
             }

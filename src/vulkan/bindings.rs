@@ -63,20 +63,14 @@ impl Layout {
         // SAFETY: a valid description; owned by the struct below.
         let set = unsafe { device.raw.create_descriptor_set_layout(&info, None) }
             .map_err(failed("create descriptor set layout"))?;
-        let mut layout = Self {
-            device: device.clone(),
-            set,
-            pipeline: vk::PipelineLayout::null(),
-            slots: slots.to_vec(),
-        };
+        let mut layout =
+            Self { device: device.clone(), set, pipeline: vk::PipelineLayout::null(), slots: slots.to_vec() };
         let sets = [set];
-        let push = [vk::PushConstantRange::default()
-            .stage_flags(vk::ShaderStageFlags::COMPUTE)
-            .size(push_bytes)];
+        let push = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(push_bytes)];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&push);
         // SAFETY: the set layout is alive; push_bytes is within the guaranteed 128.
-        layout.pipeline = unsafe { device.raw.create_pipeline_layout(&info, None) }
-            .map_err(failed("create pipeline layout"))?;
+        layout.pipeline =
+            unsafe { device.raw.create_pipeline_layout(&info, None) }.map_err(failed("create pipeline layout"))?;
         device.set_name(layout.set, "bindings");
         device.set_name(layout.pipeline, "kernels");
         Ok(Arc::new(layout))
@@ -115,14 +109,13 @@ impl Bindings {
         .map(|kind| vk::DescriptorPoolSize::default().ty(kind).descriptor_count(count));
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: a valid description; owned by the struct below.
-        let pool = unsafe { device.raw.create_descriptor_pool(&info, None) }
-            .map_err(failed("create descriptor pool"))?;
+        let pool =
+            unsafe { device.raw.create_descriptor_pool(&info, None) }.map_err(failed("create descriptor pool"))?;
         let mut bindings = Self { layout: layout.clone(), pool, set: vk::DescriptorSet::null() };
         let layouts = [layout.set];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
         // SAFETY: the pool has room for one set of this layout and is used by this thread alone.
-        let sets = unsafe { device.raw.allocate_descriptor_sets(&info) }
-            .map_err(failed("allocate descriptor set"))?;
+        let sets = unsafe { device.raw.allocate_descriptor_sets(&info) }.map_err(failed("allocate descriptor set"))?;
         bindings.set = sets[0];
         bindings.write(buffer_of);
         Ok(bindings)

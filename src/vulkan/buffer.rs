@@ -124,9 +124,10 @@ impl Buffer {
             // A block of its own gives its memory back to the system as soon as it is freed.
             allocation_scheme: AllocationScheme::DedicatedBuffer(self.raw),
         };
-        let allocation = device.allocator().allocate(&description).map_err(|error| {
-            Error::Device(format!("no memory for {} ({} bytes): {error}", self.name, self.bytes))
-        })?;
+        let allocation = device
+            .allocator()
+            .allocate(&description)
+            .map_err(|error| Error::Device(format!("no memory for {} ({} bytes): {error}", self.name, self.bytes)))?;
         // SAFETY: the allocation is alive until the buffer is freed.
         let block = unsafe { allocation.memory() };
         // SAFETY: block and offset come from the allocator for this buffer's requirements; bound once.

@@ -25,9 +25,7 @@ impl Access {
     fn stage(self) -> vk::PipelineStageFlags {
         match self {
             Access::ShaderWrite | Access::ShaderReadWrite => vk::PipelineStageFlags::COMPUTE_SHADER,
-            Access::ShaderAndIndirect => {
-                vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::DRAW_INDIRECT
-            }
+            Access::ShaderAndIndirect => vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::DRAW_INDIRECT,
             Access::HostRead => vk::PipelineStageFlags::HOST,
             Access::Transfer => vk::PipelineStageFlags::TRANSFER,
         }
@@ -38,9 +36,7 @@ impl Access {
             Access::ShaderWrite => vk::AccessFlags::SHADER_WRITE,
             Access::ShaderReadWrite => vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE,
             Access::ShaderAndIndirect => {
-                vk::AccessFlags::SHADER_READ
-                    | vk::AccessFlags::SHADER_WRITE
-                    | vk::AccessFlags::INDIRECT_COMMAND_READ
+                vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::INDIRECT_COMMAND_READ
             }
             Access::HostRead => vk::AccessFlags::HOST_READ,
             Access::Transfer => vk::AccessFlags::TRANSFER_WRITE | vk::AccessFlags::TRANSFER_READ,
@@ -86,8 +82,8 @@ impl Commands {
         let buffers = unsafe { raw.allocate_command_buffers(&info) }.map_err(failed("allocate commands"))?;
         commands.buffer = buffers[0];
         // SAFETY: a valid description.
-        commands.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
-            .map_err(failed("create fence"))?;
+        commands.fence =
+            unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }.map_err(failed("create fence"))?;
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the command buffer is fresh.
         unsafe { raw.begin_command_buffer(commands.buffer, &begin) }.map_err(failed("begin commands"))?;
@@ -101,8 +97,8 @@ impl Commands {
         let count = self.most_timed as u32 + 1;
         let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count);
         // SAFETY: the queue has timestamps.
-        self.timestamps = unsafe { self.device.raw.create_query_pool(&info, None) }
-            .map_err(failed("create timestamp pool"))?;
+        self.timestamps =
+            unsafe { self.device.raw.create_query_pool(&info, None) }.map_err(failed("create timestamp pool"))?;
         self.device.set_name(self.timestamps, "timestamps");
         // SAFETY: recording; all queries of the pool.
         unsafe { self.device.raw.cmd_reset_query_pool(self.buffer, self.timestamps, 0, count) };
@@ -167,8 +163,7 @@ impl Commands {
 
     /// What follows may touch, as `after` says, what came before has written, as `before` says.
     pub fn barrier(&mut self, before: Access, after: Access) {
-        let memory =
-            [vk::MemoryBarrier::default().src_access_mask(before.flags()).dst_access_mask(after.flags())];
+        let memory = [vk::MemoryBarrier::default().src_access_mask(before.flags()).dst_access_mask(after.flags())];
         let (from, to) = (before.stage(), after.stage());
         let flags = vk::DependencyFlags::empty();
         // SAFETY: recording; stages and accesses match each other.

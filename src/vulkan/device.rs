@@ -125,16 +125,10 @@ impl Device {
         Self::open_physical(instance, physical[index], infos[index].clone())
     }
 
-    fn open_physical(
-        instance: &Arc<Instance>,
-        physical: vk::PhysicalDevice,
-        info: DeviceInfo,
-    ) -> Result<Arc<Self>> {
+    fn open_physical(instance: &Arc<Instance>, physical: vk::PhysicalDevice, info: DeviceInfo) -> Result<Arc<Self>> {
         let (queue_family, timestamp_bits) = compute_family(instance, physical)
             .ok_or_else(|| Error::NoDevice(format!("{} has no compute queue", info.name)))?;
-        let queues = [vk::DeviceQueueCreateInfo::default()
-            .queue_family_index(queue_family)
-            .queue_priorities(&[1.0])];
+        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
         let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true);
         let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut vulkan12);
         // SAFETY: the physical device belongs to the instance; queue family and feature were asked for and are there.
@@ -217,8 +211,7 @@ fn compute_family(instance: &Instance, physical: vk::PhysicalDevice) -> Option<(
 fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> DeviceInfo {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
-    let mut properties =
-        vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup);
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup);
     // SAFETY: the physical device belongs to the instance; the chain is of structures this query fills.
     unsafe { instance.raw.get_physical_device_properties2(physical, &mut properties) };
     let core = properties.properties;
@@ -233,12 +226,7 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> DeviceInfo {
             text(driver.driver_name_as_c_str().map_err(drop)),
             text(driver.driver_info_as_c_str().map_err(drop))
         ),
-        api: format!(
-            "{}.{}.{}",
-            vk::api_version_major(api),
-            vk::api_version_minor(api),
-            vk::api_version_patch(api)
-        ),
+        api: format!("{}.{}.{}", vk::api_version_major(api), vk::api_version_minor(api), vk::api_version_patch(api)),
         kind: match core.device_type {
             vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
             vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
@@ -281,18 +269,17 @@ fn choose(infos: &[DeviceInfo], choice: &DeviceChoice) -> Result<usize> {
             .filter(|index| infos[*index].unusable.is_none())
             .min_by_key(|index| infos[*index].kind)
             .ok_or_else(|| {
-                let reasons = infos
-                    .iter()
-                    .map(|info| format!("{}: {}", info.name, info.unusable.as_deref().unwrap_or("")));
+                let reasons =
+                    infos.iter().map(|info| format!("{}: {}", info.name, info.unusable.as_deref().unwrap_or("")));
                 Error::NoDevice(format!("no usable Vulkan device: {}", reasons.collect::<Vec<_>>().join("; ")))
             })?,
         DeviceChoice::Named(name) => {
             let wanted = name.to_lowercase();
             let by_index = name.parse::<usize>().ok().filter(|index| *index < infos.len());
             let by_name = || infos.iter().position(|info| info.name.to_lowercase().contains(&wanted));
-            by_index.or_else(by_name).ok_or_else(|| {
-                Error::NoDevice(format!("no device '{name}'; there is {}", listed()))
-            })?
+            by_index
+                .or_else(by_name)
+                .ok_or_else(|| Error::NoDevice(format!("no device '{name}'; there is {}", listed())))?
         }
     };
     match &infos[index].unusable {

@@ -57,8 +57,7 @@ impl Instance {
             }
             result => Error::NoDevice(format!("cannot create a Vulkan instance: {result}")),
         })?;
-        let mut instance =
-            Self { raw, has_debug_utils, messenger: None, messages: Arc::default(), _entry: entry };
+        let mut instance = Self { raw, has_debug_utils, messenger: None, messages: Arc::default(), _entry: entry };
         if validate {
             instance.messenger = Some(instance.listen()?);
         }
@@ -78,8 +77,8 @@ impl Instance {
             .pfn_user_callback(Some(keep_message))
             .user_data(Arc::as_ptr(&self.messages).cast_mut().cast());
         // SAFETY: the callback has the right signature and its user data lives as long as the messenger.
-        let messenger = unsafe { utils.create_debug_utils_messenger(&info, None) }
-            .map_err(failed("create debug messenger"))?;
+        let messenger =
+            unsafe { utils.create_debug_utils_messenger(&info, None) }.map_err(failed("create debug messenger"))?;
         Ok((utils, messenger))
     }
 

@@ -1,1 +1,180 @@
-//! x
+//! glTF 2.0 → [`Scene`].
+//!
+//! ```text
+//! bytes ─ container ─→ JSON ─ check ─→ typed JSON (gltf crate) ─ buffers ─→ bytes of accessors
+//!                      nodes ─→ instances, cameras, lights;  primitives ─→ meshes;  materials
+//! ```
+//! Nothing is trusted: every index, size and count is checked against what is there before it is used. A fault that
+//! leaves no sensible picture refuses the file; any other, and everything that is not shown, becomes a warning.
+
+mod accessor;
+mod buffers;
+mod check;
+mod container;
+mod materials;
+mod meshes;
+mod nodes;
+
+use super::Scene;
+use crate::error::{Error, Result};
+use ::gltf::json::{validation::Validate, Path as JsonPath, Root};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
+
+/// Extensions that are shown exactly.
+pub const SUPPORTED_EXTENSIONS: [&str; 5] = [
+    "EXT_mesh_gpu_instancing",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+];
+
+/// Reads a scene from a `.gltf` or `.glb` file, or from standard input for `-` (then without files beside it).
+/// `scene_choice` is the name or index of one of the file's scenes.
+///
+/// # Errors
+/// `Read` when a file cannot be read; `Content` when it is not glTF, is broken, or requires an extension that is not
+/// supported; `Usage` when there is no such scene.
+pub fn read(path: &Path, scene_choice: Option<&str>) -> Result<Scene> {
+    let is_stdin = path.as_os_str() == "-";
+    let failed = |source| Error::Read { path: path.to_owned(), source };
+    let bytes = if is_stdin {
+        let mut bytes = Vec::new();
+        std::io::stdin().lock().read_to_end(&mut bytes).map_err(failed)?;
+        bytes
+    } else {
+        std::fs::read(path).map_err(failed)?
+    };
+    let folder = if is_stdin { None } else { Some(path.parent().unwrap_or(Path::new("."))) };
+    let name =
+        if is_stdin { "stdin".into() } else { path.file_stem().unwrap_or_default().to_string_lossy().into_owned() };
+    let file = if is_stdin { "standard input".into() } else { path.display().to_string() };
+    parse(&bytes, name, &file, folder, scene_choice)
+}
+
+/// Reads a scene from the bytes of a `.gltf` or `.glb` file called `file` in messages. Files that it names are looked for
+/// in `folder`; without one they are refused.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(
+    bytes: &[u8],
+    name: String,
+    file: &str,
+    folder: Option<&Path>,
+    scene_choice: Option<&str>,
+) -> Result<Scene> {
+    let container = container::split(bytes).map_err(|message| Error::content(file, message))?;
+    let mut document = Document::new(container, file)?;
+    document.buffers = buffers::load(&document.root, container.binary, file, folder, &mut document.warnings)?;
+    document.note_what_is_not_shown();
+    let mut scene = Scene { name, ..Scene::default() };
+    document.add_materials(&mut scene);
+    let primitives = document.add_meshes(&mut scene)?;
+    document.add_nodes(&mut scene, &primitives, scene_choice)?;
+    scene.warnings = document.warnings.into_lines();
+    Ok(scene)
+}
+
+/// A parsed and checked document.
+struct Document<'a> {
+    /// The file, for messages.
+    file: &'a str,
+    /// As the `gltf` crate types it.
+    root: Root,
+    /// Content of each buffer.
+    buffers: Vec<Vec<u8>>,
+    warnings: Warnings,
+}
+
+impl<'a> Document<'a> {
+    fn new(container: container::Container, file: &'a str) -> Result<Self> {
+        let refuse = |message: String| Error::content(file, message);
+        let value: Value = serde_json::from_slice(container.json)
+            .map_err(|error| refuse(format!("the JSON is not valid: {error}")))?;
+        let mut warnings = Warnings::default();
+        container.warnings.iter().for_each(|warning| warnings.add(*warning));
+        check::version(&value).map_err(refuse)?;
+        check::required_extensions(&value).map_err(refuse)?;
+        check::document(&value, container.binary.is_some(), &mut warnings).map_err(refuse)?;
+        let root: Root =
+            serde_json::from_slice(container.json).map_err(|error| refuse(format!("not a glTF document: {error}")))?;
+        let document = Self { file, root, buffers: Vec::new(), warnings };
+        document.validate()?;
+        Ok(document)
+    }
+
+    /// The `gltf` crate's own validation; what it holds against files that can be shown all the same is left to `check`.
+    fn validate(&self) -> Result<()> {
+        let mut faults: Vec<String> = Vec::new();
+        let mut report = |path: &dyn Fn() -> JsonPath, error| {
+            let path = path().as_str().to_owned();
+            let harmless = ["bufferView", "min", "max", "byteStride"].iter().any(|end| path.ends_with(end))
+                || path.starts_with("extensionsRequired")
+                || path.contains("attributes")
+                || path.starts_with("cameras");
+            if !harmless {
+                faults.push(format!("{path}: {error}"));
+            }
+        };
+        self.root.validate(&self.root, JsonPath::new, &mut report);
+        match faults.first() {
+            Some(fault) => Err(self.refuse(fault)),
+            None => Ok(()),
+        }
+    }
+
+    fn refuse(&self, message: impl ToString) -> Error {
+        Error::content(self.file, message)
+    }
+
+    /// Warns of all parts of the file that have no influence on the picture yet.
+    fn note_what_is_not_shown(&mut self) {
+        let root = &self.root;
+        let notes = [
+            (root.skins.len(), "skins: meshes stand in their bind pose"),
+            (root.animations.len(), "animations: the nodes' own transforms are shown"),
+            (root.textures.len(), "textures: factors alone colour the materials"),
+        ];
+        for (count, what) in notes {
+            if count > 0 {
+                self.warnings.add(format!("ignored: {count} {what}"));
+            }
+        }
+        for extension in &root.extensions_used {
+            if !SUPPORTED_EXTENSIONS.contains(&extension.as_str()) {
+                self.warnings.add(format!("ignored: extension {extension}"));
+            }
+        }
+    }
+}
+
+/// Warnings, each text once with the number of times it was given.
+#[derive(Default)]
+struct Warnings {
+    order: Vec<String>,
+    counts: BTreeMap<String, usize>,
+}
+
+impl Warnings {
+    fn add(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        let count = self.counts.entry(text.clone()).or_default();
+        *count += 1;
+        if *count == 1 {
+            self.order.push(text);
+        }
+    }
+
+    fn into_lines(self) -> Vec<String> {
+        let Self { order, counts } = self;
+        let line = |text: String| match counts.get(&text) {
+            Some(count) if *count > 1 => format!("{text} ({count} times)"),
+            _ => text,
+        };
+        order.into_iter().map(line).collect()
+    }
+}

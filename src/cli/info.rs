@@ -1,0 +1,133 @@
+//! `glimt info`.
+
+use super::{load_scene, Outcome};
+use clap::{Args, ValueHint};
+use glimt::scene::{LightKind, Projection, Soup};
+use glimt::{Result, Scene};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Flags of `glimt info`.
+#[derive(Args)]
+pub struct InfoArgs {
+    /// A .gltf or .glb file, - for standard input, or a built-in scene
+    #[arg(value_hint = ValueHint::FilePath)]
+    scene: String,
+    /// Scene of the file, by name or index
+    #[arg(long = "scene", value_name = "NAME|INDEX")]
+    scene_choice: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is in a scene.
+#[derive(Serialize)]
+struct Info {
+    name: String,
+    meshes: usize,
+    instances: usize,
+    triangles: usize,
+    unique_triangles: usize,
+    vertices: usize,
+    bounds: Option<[[f64; 3]; 2]>,
+    materials: Vec<String>,
+    lights: Vec<String>,
+    cameras: Vec<String>,
+    warnings: Vec<String>,
+}
+
+impl Info {
+    fn of(scene: &Scene) -> Result<Self> {
+        let soup = Soup::of(scene)?;
+        let rgb = |v: glam::DVec3| format!("{:.3} {:.3} {:.3}", v.x, v.y, v.z);
+        let material = |material: &glimt::scene::Material| {
+            let sides = if material.double_sided { "both sides" } else { "front only" };
+            match &material.whitted {
+                Some(w) => format!(
+                    "{}: exact: diffuse {}, specular {} ^{}, mirror {}; {sides}",
+                    material.name,
+                    rgb(w.diffuse),
+                    rgb(w.specular),
+                    w.shininess,
+                    rgb(w.mirror)
+                ),
+                None if material.unlit => format!("{}: unlit {}; {sides}", material.name, rgb(material.base_color)),
+                None => format!(
+                    "{}: base {}, metallic {:.2}, roughness {:.2}, emission {}; {sides}",
+                    material.name,
+                    rgb(material.base_color),
+                    material.metallic,
+                    material.roughness,
+                    rgb(material.emission)
+                ),
+            }
+        };
+        let light = |light: &glimt::scene::Light| match light.kind {
+            LightKind::Point => format!("point at {}, {} cd", rgb(light.position), rgb(light.intensity)),
+            LightKind::Spot { .. } => format!("spot at {}, {} cd", rgb(light.position), rgb(light.intensity)),
+            LightKind::Directional => {
+                format!("directional along {}, {} lx", rgb(light.direction), rgb(light.intensity))
+            }
+        };
+        let camera = |(name, camera): &(String, glimt::scene::Camera)| match camera.projection {
+            Projection::Perspective { fov } => {
+                format!("{name}: perspective, {:.2}° high, at {}", fov.to_degrees(), rgb(camera.eye))
+            }
+            Projection::Orthographic { half_height } => {
+                format!("{name}: orthographic, {:.3} m high, at {}", 2.0 * half_height, rgb(camera.eye))
+            }
+        };
+        Ok(Self {
+            name: scene.name.clone(),
+            meshes: scene.meshes.len(),
+            instances: scene.instances.len(),
+            triangles: soup.len(),
+            unique_triangles: scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum(),
+            vertices: scene.meshes.iter().map(|mesh| mesh.positions.len()).sum(),
+            bounds: scene.bounds().map(|(lo, hi)| [lo.to_array(), hi.to_array()]),
+            materials: scene.materials.iter().map(material).collect(),
+            lights: scene.lights.iter().map(light).collect(),
+            cameras: scene.cameras.iter().map(camera).collect(),
+            warnings: scene.warnings.iter().chain(&soup.warnings).cloned().collect(),
+        })
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!(
+            "{}: {} triangles ({} stored once) in {} instances of {} meshes, {} vertices\n",
+            self.name, self.triangles, self.unique_triangles, self.instances, self.meshes, self.vertices
+        );
+        if let Some([lo, hi]) = self.bounds {
+            let _ = writeln!(text, "box: {lo:.4?} to {hi:.4?}");
+        }
+        let lists = [
+            ("cameras", &self.cameras, "none: one that frames the scene is used"),
+            ("lights", &self.lights, "none: a default light is used"),
+            ("materials", &self.materials, "none"),
+            ("approximated, ignored or dropped", &self.warnings, "nothing: all of the file is used"),
+        ];
+        for (title, lines, none) in lists {
+            let _ = writeln!(text, "{title}:");
+            if lines.is_empty() {
+                let _ = writeln!(text, "  {none}");
+            }
+            for line in lines {
+                let _ = writeln!(text, "  {line}");
+            }
+        }
+        text
+    }
+}
+
+impl InfoArgs {
+    /// Reads the scene and describes it.
+    pub fn run(self) -> Result<Outcome> {
+        let info = Info::of(&load_scene(&self.scene, self.scene_choice.as_deref())?)?;
+        if self.json {
+            Outcome::json(&info)
+        } else {
+            Ok(Outcome::text(info.text()))
+        }
+    }
+}

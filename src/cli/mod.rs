@@ -1,0 +1,139 @@
+//! The command line: one file a subcommand, each turning flags into options and results into text.
+
+mod completions;
+mod devices;
+mod diff;
+mod explain;
+mod info;
+mod progress;
+mod render;
+mod values;
+mod view;
+
+use clap::{Parser, Subcommand};
+use glimt::{scene, Error, Result, Scene};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// What every command gets.
+pub struct Context {
+    /// Start of the process.
+    pub started: Instant,
+    /// Set by Ctrl-C.
+    pub interrupted: Arc<AtomicBool>,
+}
+
+/// What a command leaves to be printed.
+#[derive(Default)]
+pub struct Outcome {
+    /// Results.
+    pub stdout: Vec<u8>,
+    /// What is said about them.
+    pub stderr: String,
+    /// Exit code: 0, or 1 when a check said no.
+    pub code: u8,
+}
+
+impl Outcome {
+    fn text(text: impl Into<String>) -> Self {
+        Self { stdout: text.into().into_bytes(), ..Self::default() }
+    }
+
+    fn json(value: &impl serde::Serialize) -> Result<Self> {
+        let mut text = serde_json::to_string(value).map_err(|error| Error::Usage(format!("JSON: {error}")))?;
+        text.push('\n');
+        Ok(Self::text(text))
+    }
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  glimt render                                      the built-in table → table.png
+  glimt render model.glb -o picture.png             a glTF file, its own camera and lights
+  glimt render model.glb --size 512x512 --spp 16 --background transparent
+  glimt render cornell --json | jq .times_ms        one JSON object on standard output
+  cat model.glb | glimt render - -o - > out.png     from a pipe to a pipe
+  glimt explain model.glb                           what is computed, what is left out, and why
+  glimt diff a.png b.png --max-rmse 0.004           exit code 1 when they differ more
+
+Exit codes: 0 done · 1 a check said no · 2 bad usage or input · 3 no usable device, or it failed · 4 output not written";
+
+/// Headless Vulkan ray tracer for glTF scenes: the same picture on every device, GPU or none.
+#[derive(Parser)]
+#[command(name = "glimt", version, after_help = EXAMPLES, max_term_width = 120)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render a scene to a PNG, OpenEXR or Radiance HDR file
+    Render(render::RenderArgs),
+    /// Say what is in a scene, what will be used, approximated and ignored
+    Info(info::InfoArgs),
+    /// Say what the renderer does for a scene: passes, buffers, features, and what it leaves out and why
+    Explain(explain::ExplainArgs),
+    /// List the Vulkan devices
+    Devices(devices::DevicesArgs),
+    /// Compare two pictures: RMSE, PSNR, maximum difference, SSIM, FLIP
+    Diff(diff::DiffArgs),
+    /// Print a completion script for a shell
+    Completions(completions::CompletionsArgs),
+}
+
+impl Cli {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// Whatever the command meets.
+    pub fn run(self, context: &Context) -> Result<Outcome> {
+        match self.command {
+            Command::Render(args) => args.run(context),
+            Command::Info(args) => args.run(),
+            Command::Explain(args) => args.run(),
+            Command::Devices(args) => args.run(),
+            Command::Diff(args) => args.run(),
+            Command::Completions(args) => args.run(),
+        }
+    }
+}
+
+/// A scene by the name of a built-in one, by path, or `-` for standard input. A file wins over a built-in of its name.
+fn load_scene(name: &str, scene_choice: Option<&str>) -> Result<Scene> {
+    let is_built_in = scene::BUILT_IN.iter().any(|(own, _)| *own == name);
+    if is_built_in && !Path::new(name).exists() {
+        if let Some(choice) = scene_choice {
+            return Err(Error::Usage(format!("the built-in scene '{name}' has no scene '{choice}' in it")));
+        }
+        return scene::built_in(name);
+    }
+    scene::gltf::read(Path::new(name), scene_choice).map_err(|error| match error {
+        Error::Read { path, source } if source.kind() == std::io::ErrorKind::NotFound => Error::Usage(format!(
+            "{}: no such file, and no built-in scene of that name ({})",
+            path.display(),
+            scene::BUILT_IN.map(|(own, _)| own).join(", ")
+        )),
+        error => error,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent_and_every_flag_is_documented() {
+        let command = Cli::command();
+        command.clone().debug_assert();
+        for sub in command.get_subcommands() {
+            assert!(sub.get_about().is_some(), "{}", sub.get_name());
+            for argument in sub.get_arguments() {
+                assert!(argument.get_help().is_some(), "{} {}", sub.get_name(), argument.get_id());
+            }
+        }
+    }
+}

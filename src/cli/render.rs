@@ -1,0 +1,217 @@
+//! `glimt render`.
+
+use super::view::ViewArgs;
+use super::{load_scene, progress, Context, Outcome};
+use clap::{Args, ValueHint};
+use glimt::film::{Film, Format, Saved};
+use glimt::render::{build_tree, describe, Prepared, Renderer};
+use glimt::vulkan::DeviceChoice;
+use glimt::{reference, report, Error, Options, Report, Result, Scene};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// Flags of `glimt render`.
+#[derive(Args)]
+pub struct RenderArgs {
+    /// A .gltf or .glb file, - for standard input, or a built-in scene: table, cornell, mirrors, teapot
+    #[arg(value_hint = ValueHint::FilePath, default_value = "table")]
+    scene: String,
+    /// File to write: .png, .exr or .hdr; - writes PNG to standard output [default: the scene's name with .png]
+    #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    output: Option<PathBuf>,
+    /// Bits a channel of a PNG
+    #[arg(long, value_name = "8|16", default_value_t = 8, value_parser = bits)]
+    bits: u8,
+    /// Device by index or part of its name, or `reference` for the slow f64 renderer [default: the best]
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+    /// Switch the Vulkan validation layers on; any message of theirs is an error
+    #[arg(long)]
+    validate: bool,
+    /// Threads for host work and software Vulkan [default: all]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Print one JSON object on standard output, nothing else
+    #[arg(long)]
+    json: bool,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+    #[command(flatten)]
+    view: ViewArgs,
+}
+
+fn bits(text: &str) -> Result<u8, String> {
+    match text {
+        "8" => Ok(8),
+        "16" => Ok(16),
+        _ => Err("a PNG has 8 or 16 bits a channel".into()),
+    }
+}
+
+impl RenderArgs {
+    /// Renders, writes, reports.
+    pub fn run(self, context: &Context) -> Result<Outcome> {
+        let mut options = self.view.options()?;
+        options.validate = self.validate;
+        options.interrupted = context.interrupted.clone();
+        options.progress = if self.quiet { None } else { progress::bar() };
+        let target = Target::of(&self)?;
+        self.set_threads()?;
+
+        let (film, mut report) = match self.device.as_deref() {
+            Some("reference") => self.on_reference(&options)?,
+            device => {
+                options.device = device.map_or(DeviceChoice::Best, |name| DeviceChoice::Named(name.into()));
+                self.on_device(&options)?
+            }
+        };
+        let start = Instant::now();
+        let mut outcome = Outcome::default();
+        let saved = target.save(&film, &mut outcome.stdout, || match context.interrupted.load(Ordering::Relaxed) {
+            true => Err(Error::Interrupted),
+            false => Ok(()),
+        })?;
+        report.times_ms.save = milliseconds(start);
+        report.times_ms.total = milliseconds(context.started);
+        report.image.path = target.path.display().to_string();
+        report.image.sha256 = saved.sha256;
+        if self.json {
+            outcome.stdout = Outcome::json(&report)?.stdout;
+        } else if !target.is_stdout {
+            outcome.stdout = format!("{}\n", target.path.display()).into_bytes();
+        }
+        if !self.quiet && !self.json {
+            outcome.stderr = report.text() + "\n";
+        }
+        Ok(outcome)
+    }
+
+    /// The scene is read and its tree built while the device opens.
+    fn on_device(&self, options: &Options) -> Result<(Film, Report)> {
+        std::thread::scope(|threads| {
+            let device = threads.spawn(|| Renderer::new(&options.device, options.validate));
+            let start = Instant::now();
+            let (scene, prepared) = self.load(options)?;
+            let load = milliseconds(start);
+            let start = Instant::now();
+            let (bvh, center) = build_tree(&prepared.soup);
+            let bvh_ms = milliseconds(start);
+            let renderer = device.join().map_err(|_| Error::Device("opening it failed".into()))??;
+            let (film, mut report) = renderer.render_with_tree(&scene, &prepared, options, &bvh, center)?;
+            (report.times_ms.load, report.times_ms.bvh) = (load, bvh_ms);
+            Ok((film, report))
+        })
+    }
+
+    fn on_reference(&self, options: &Options) -> Result<(Film, Report)> {
+        let start = Instant::now();
+        let (scene, Prepared { soup, view, .. }) = self.load(options)?;
+        let load = milliseconds(start);
+        let start = Instant::now();
+        let progress = options.progress.as_deref().map(|progress| progress as reference::Progress);
+        let film = reference::render(&scene, &soup, &view, &options.interrupted, progress)?;
+        let report = Report {
+            image: report::Image { width: view.width, height: view.height, ..Default::default() },
+            device: report::Device { name: "reference".into(), kind: "cpu".into(), ..Default::default() },
+            scene: describe(&scene, &soup, &view),
+            times_ms: report::Times { load, render: milliseconds(start), ..Default::default() },
+            ..Default::default()
+        };
+        Ok((film, report))
+    }
+
+    fn load(&self, options: &Options) -> Result<(Scene, Prepared)> {
+        let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
+        let prepared = Prepared::new(&scene, options)?;
+        Ok((scene, prepared))
+    }
+
+    fn set_threads(&self) -> Result<()> {
+        let Some(threads) = self.threads else { return Ok(()) };
+        let refuse = |why: String| Error::Usage(format!("--threads {threads}: {why}"));
+        if !(1..=1024).contains(&threads) {
+            return Err(refuse("must be 1 to 1024".into()));
+        }
+        // Mesa's software Vulkan reads this when the device is opened; no other thread runs yet.
+        std::env::set_var("LP_NUM_THREADS", threads.to_string());
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|error| refuse(error.to_string()))
+    }
+}
+
+/// Where the picture goes.
+struct Target {
+    path: PathBuf,
+    format: Format,
+    is_stdout: bool,
+}
+
+impl Target {
+    /// The target of a command line; what could be known to fail later fails now.
+    fn of(args: &RenderArgs) -> Result<Self> {
+        let is_stdout = args.output.as_deref() == Some(Path::new("-"));
+        if is_stdout && args.json {
+            return Err(Error::Usage("--json and -o - both want standard output: write the picture to a file".into()));
+        }
+        if is_stdout {
+            let format = if args.bits == 8 { Format::Png8 } else { Format::Png16 };
+            return Ok(Self { path: "-".into(), format, is_stdout });
+        }
+        let path = args.output.clone().unwrap_or_else(|| {
+            let name = if args.scene == "-" { "stdin".as_ref() } else { Path::new(&args.scene) };
+            PathBuf::from(name.file_stem().unwrap_or("picture".as_ref())).with_extension("png")
+        });
+        let format = Format::of(&path, args.bits)?;
+        glimt::film::check_writable(&path)?;
+        Ok(Self { path, format, is_stdout })
+    }
+
+    fn save(&self, film: &Film, stdout: &mut Vec<u8>, may_finish: impl FnOnce() -> Result<()>) -> Result<Saved> {
+        if self.is_stdout {
+            return film.encode(stdout, self.format, &self.path);
+        }
+        film.save(&self.path, self.format, may_finish)
+    }
+}
+
+fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        render: RenderArgs,
+    }
+
+    fn target(flags: &str) -> Result<Target> {
+        let only = Only::try_parse_from(std::iter::once("x").chain(flags.split_whitespace()));
+        Target::of(&only.map_err(|error| Error::Usage(error.to_string()))?.render)
+    }
+
+    #[test]
+    fn the_picture_is_named_after_the_scene() {
+        assert_eq!(target("").unwrap().path, Path::new("table.png"));
+        assert_eq!(target("some/where/model.glb").unwrap().path, Path::new("model.png"));
+        assert_eq!(target("-").unwrap().path, Path::new("stdin.png"));
+    }
+
+    #[test]
+    fn the_extension_is_the_format() {
+        assert_eq!(target("-o a.PNG").unwrap().format, Format::Png8);
+        assert_eq!(target("-o a.png --bits 16").unwrap().format, Format::Png16);
+        assert_eq!(target("-o a.exr").unwrap().format, Format::Exr);
+        assert_eq!(target("-o a.hdr").unwrap().format, Format::Hdr);
+        assert!(target("-o -").unwrap().is_stdout);
+        for flags in ["-o a.jpg", "-o a", "-o a.exr --bits 16", "--bits 12", "-o - --json"] {
+            assert_eq!(target(flags).err().map(|error| error.exit_code()), Some(2), "{flags}");
+        }
+        assert_eq!(target("-o no/such/folder/a.png").err().map(|error| error.exit_code()), Some(4));
+    }
+}

@@ -1,0 +1,40 @@
+//! Values of flags.
+
+use glam::DVec3;
+
+/// `WxH`, pixels.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
+    let parts = text.split_once(['x', 'X', '×']).ok_or("give width and height, as in 640x480")?;
+    let side = |part: &str| part.trim().parse::<u32>().map_err(|_| format!("'{part}' is no number of pixels"));
+    Ok((side(parts.0)?, side(parts.1)?))
+}
+
+/// `x,y,z`.
+pub fn vector(text: &str) -> Result<DVec3, String> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|part| part.trim().parse().map_err(|_| format!("'{part}' is no number")))
+        .collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [x, y, z] if numbers.iter().all(|number| number.is_finite()) => Ok(DVec3::new(x, y, z)),
+        _ => Err("give three finite numbers, as in 0,1.5,3".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(size("640x480"), Ok((640, 480)));
+        assert_eq!(size("1X2"), Ok((1, 2)));
+        assert!(size("640").is_err() && size("x").is_err() && size("-1x2").is_err() && size("1.5x2").is_err());
+    }
+
+    #[test]
+    fn vectors() {
+        assert_eq!(vector("0,-1.5,3e2"), Ok(DVec3::new(0.0, -1.5, 300.0)));
+        assert!(vector("1,2").is_err() && vector("1,2,x").is_err() && vector("1,2,inf").is_err());
+    }
+}

@@ -1,0 +1,214 @@
+//! The oracle: the same picture in f64, by plain recursion over every triangle. No tree, no queues, no GPU, and no line in
+//! common with the kernels: where both agree, two independent programs do.
+//!
+//! Intersection is by Möller and Trumbore (JGT 2(1) 1997), not by the kernels' method; vectors, lights and sampling are
+//! written down again from their sources.
+
+mod sampling;
+
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::scene::{Background, Light, LightKind, Projection, Scene, Soup, View};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Called with rows done and rows in all.
+pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
+
+/// Renders the view; one row after the other on all threads.
+///
+/// # Errors
+/// `Interrupted` when the flag is set.
+pub fn render(
+    scene: &Scene,
+    soup: &Soup,
+    view: &View,
+    interrupted: &AtomicBool,
+    progress: Option<Progress>,
+) -> Result<Film> {
+    let tracer = Tracer { scene, soup, view, scale: (soup.hi - soup.lo).length().max(1e-30) };
+    let mut film = Film::new(view.width, view.height, view.background == Background::Transparent);
+    let done = AtomicU64::new(0);
+    film.pixels.par_chunks_mut(view.width as usize).enumerate().try_for_each(|(y, row)| {
+        if interrupted.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        for (x, pixel) in row.iter_mut().enumerate() {
+            *pixel = tracer.pixel(x as u32, y as u32);
+        }
+        if let Some(progress) = progress {
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, view.height.into());
+        }
+        Ok(())
+    })?;
+    Ok(film)
+}
+
+struct Tracer<'a> {
+    scene: &'a Scene,
+    soup: &'a Soup,
+    view: &'a View,
+    /// Size of the scene, to which offsets are relative.
+    scale: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Ray {
+    origin: DVec3,
+    direction: DVec3,
+}
+
+struct Hit {
+    t: f64,
+    primitive: usize,
+    /// λ2, λ3.
+    barycentrics: (f64, f64),
+}
+
+impl Tracer<'_> {
+    fn pixel(&self, x: u32, y: u32) -> [f32; 4] {
+        let view = self.view;
+        let (mut color, mut alpha) = (DVec3::ZERO, 0.0);
+        for index in 0..view.samples {
+            let (dx, dy) =
+                if view.samples == 1 { (0.5, 0.5) } else { sampling::position(view, y * view.width + x, index) };
+            let ray = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy);
+            match self.nearest(&ray) {
+                Some(hit) => {
+                    color += self.shade(&ray, &hit, 0);
+                    alpha += 1.0;
+                }
+                None => {
+                    color += view.background.radiance(ray.direction);
+                    alpha += view.background.alpha();
+                }
+            }
+        }
+        let mean = (color / f64::from(view.samples)).as_vec3();
+        [mean.x, mean.y, mean.z, (alpha / f64::from(view.samples)) as f32]
+    }
+
+    fn camera_ray(&self, x: f64, y: f64) -> Ray {
+        let (width, height) = (f64::from(self.view.width), f64::from(self.view.height));
+        let camera = &self.view.camera;
+        let (right, up) = camera.half_axes(width / height);
+        let offset = right * (2.0 * x / width - 1.0) + up * (1.0 - 2.0 * y / height);
+        match camera.projection {
+            Projection::Perspective { .. } => {
+                Ray { origin: camera.eye, direction: (camera.forward + offset).normalize() }
+            }
+            Projection::Orthographic { .. } => Ray { origin: camera.eye + offset, direction: camera.forward },
+        }
+    }
+
+    /// λ2, λ3, t and whether the front is hit; for a ray that meets the triangle in front of its origin.
+    fn intersect(&self, ray: &Ray, primitive: usize) -> Option<(f64, f64, f64, bool)> {
+        let [a, b, c] = self.soup.positions[primitive];
+        let (edge_b, edge_c) = (b - a, c - a);
+        let across = ray.direction.cross(edge_c);
+        let determinant = edge_b.dot(across);
+        if determinant == 0.0 {
+            return None;
+        }
+        let from_a = ray.origin - a;
+        let u = from_a.dot(across) / determinant;
+        let around = from_a.cross(edge_b);
+        let v = ray.direction.dot(around) / determinant;
+        let t = edge_c.dot(around) / determinant;
+        (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some((u, v, t, determinant > 0.0))
+    }
+
+    /// The nearest hit of all triangles; of several at the same distance the first in the soup.
+    fn nearest(&self, ray: &Ray) -> Option<Hit> {
+        let mut nearest: Option<Hit> = None;
+        for primitive in 0..self.soup.len() {
+            let Some((u, v, t, front)) = self.intersect(ray, primitive) else { continue };
+            let seen = front || !self.soup.flags[primitive].single_sided;
+            if seen && nearest.as_ref().is_none_or(|hit| t < hit.t) {
+                nearest = Some(Hit { t, primitive, barycentrics: (u, v) });
+            }
+        }
+        nearest
+    }
+
+    /// Something, front or back, lies on the ray closer than `distance`.
+    fn blocked(&self, ray: &Ray, distance: f64) -> bool {
+        (0..self.soup.len()).any(|primitive| self.intersect(ray, primitive).is_some_and(|(_, _, t, _)| t < distance))
+    }
+
+    /// Ambient + emission + lights + mirror, as seen along the ray.
+    fn shade(&self, ray: &Ray, hit: &Hit, depth: u32) -> DVec3 {
+        let primitive = hit.primitive;
+        let [a, b, c] = self.soup.positions[primitive];
+        let (u, v) = hit.barycentrics;
+        let weights = [1.0 - u - v, u, v];
+        let point = a * weights[0] + b * weights[1] + c * weights[2];
+        let mut plane_normal = (b - a).normalize().cross((c - a).normalize()).normalize();
+        let mut normal = plane_normal;
+        if self.soup.flags[primitive].smooth {
+            let corners = self.soup.normals[primitive];
+            normal = (0..3).map(|i| corners[i].as_dvec3() * weights[i]).sum::<DVec3>().normalize();
+        }
+        if plane_normal.dot(ray.direction) > 0.0 {
+            plane_normal = -plane_normal;
+            normal = -normal;
+        }
+        let tint = if self.soup.flags[primitive].colored {
+            let corners = self.soup.colors[primitive];
+            (0..3).map(|i| corners[i].as_dvec3() * weights[i]).sum()
+        } else {
+            DVec3::ONE
+        };
+        let material = &self.scene.materials[self.soup.materials[primitive] as usize];
+        let whitted = material.whitted(tint);
+        let leave = |direction: DVec3| {
+            let side = if plane_normal.dot(direction) < 0.0 { -1.0 } else { 1.0 };
+            Ray { origin: point + plane_normal * (side * 1e-9 * self.scale), direction }
+        };
+
+        let mut color = whitted.ambient + material.emission;
+        let to_viewer = -ray.direction;
+        for light in &self.view.lights {
+            let (to_light, distance, irradiance) = arriving(light, point);
+            let cosine = normal.dot(to_light);
+            if cosine <= 0.0 || irradiance == DVec3::ZERO || self.blocked(&leave(to_light), distance) {
+                continue;
+            }
+            let halfway = (to_light + to_viewer).normalize();
+            let gloss = normal.dot(halfway).max(0.0).powf(whitted.shininess);
+            color += irradiance * (whitted.diffuse * cosine + whitted.specular * gloss);
+        }
+        if depth < self.view.max_depth && whitted.mirror.max_element() > 0.0 {
+            // r = 2(n·v)n − v
+            let reflected = (normal * (2.0 * normal.dot(to_viewer)) - to_viewer).normalize();
+            let ray = leave(reflected);
+            let seen = match self.nearest(&ray) {
+                Some(hit) => self.shade(&ray, &hit, depth + 1),
+                None => self.view.background.radiance(reflected),
+            };
+            color += whitted.mirror * seen;
+        }
+        color
+    }
+}
+
+/// Direction to the light, distance, and irradiance on a surface that faces it (KHR_lights_punctual).
+fn arriving(light: &Light, point: DVec3) -> (DVec3, f64, DVec3) {
+    if light.kind == LightKind::Directional {
+        return (-light.direction, f64::INFINITY, light.intensity);
+    }
+    let to_light = light.position - point;
+    let distance = to_light.length();
+    let direction = to_light / distance;
+    let mut strength = 1.0 / (distance * distance);
+    if let Some(range) = light.range {
+        strength *= (1.0 - (distance / range).powi(4)).clamp(0.0, 1.0);
+    }
+    if let LightKind::Spot { inner_cosine, outer_cosine } = light.kind {
+        let cosine = light.direction.dot(-direction);
+        let cone = ((cosine - outer_cosine) / (inner_cosine - outer_cosine).max(0.001)).clamp(0.0, 1.0);
+        strength *= cone * cone;
+    }
+    (direction, distance, light.intensity * strength)
+}

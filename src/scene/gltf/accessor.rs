@@ -1,0 +1,168 @@
+//! Accessors: typed elements in buffers, with every component type, normalisation, stride and sparse replacement.
+
+use super::Document;
+use crate::error::Result;
+use ::gltf::json::accessor::{ComponentType, Type};
+use ::gltf::json::{buffer, validation::Checked, Index};
+
+/// Most elements of an accessor that no buffer view backs: there the count alone decides what is allocated.
+const MOST_UNBACKED: u64 = 1 << 26;
+
+/// Values of an accessor, `components` to an element.
+pub(super) struct Elements<T> {
+    pub components: usize,
+    pub values: Vec<T>,
+}
+
+/// What is needed to find elements: bytes of the view from the first element on, and the distances.
+struct Layout<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+}
+
+/// Reads one component as a number; integers are divided by their largest value if normalised (glTF 2.0, 3.11).
+fn number(kind: ComponentType, normalized: bool, bytes: &[u8]) -> f32 {
+    let scaled = |value: f32, largest: f32| if normalized { (value / largest).max(-1.0) } else { value };
+    match kind {
+        ComponentType::I8 => scaled(f32::from(bytes[0] as i8), 127.0),
+        ComponentType::U8 => scaled(f32::from(bytes[0]), 255.0),
+        ComponentType::I16 => scaled(f32::from(i16::from_le_bytes([bytes[0], bytes[1]])), 32767.0),
+        ComponentType::U16 => scaled(f32::from(u16::from_le_bytes([bytes[0], bytes[1]])), 65535.0),
+        ComponentType::U32 => integer(kind, bytes) as f32,
+        ComponentType::F32 => f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+    }
+}
+
+/// Reads one component as an unsigned integer; signed and float ones are no indices.
+fn integer(kind: ComponentType, bytes: &[u8]) -> u32 {
+    match kind {
+        ComponentType::U8 => bytes[0].into(),
+        ComponentType::U16 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
+        ComponentType::U32 => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+        _ => u32::MAX,
+    }
+}
+
+impl Document<'_> {
+    /// Elements as floats.
+    pub fn floats(&self, index: usize) -> Result<Elements<f32>> {
+        let accessor = &self.root.accessors[index];
+        let normalized = accessor.normalized;
+        self.read(index, 0.0, |kind, bytes| number(kind, normalized, bytes))
+    }
+
+    /// Elements of a scalar accessor of unsigned integers.
+    pub fn indices(&self, index: usize) -> Result<Vec<u32>> {
+        let elements = self.read(index, 0, integer)?;
+        match &self.root.accessors[index].component_type {
+            Checked::Valid(kind) if elements.components == 1 && is_unsigned(kind.0) => Ok(elements.values),
+            _ => Err(self.refuse(format!("accessors[{index}]: indices must be unsigned integer scalars"))),
+        }
+    }
+
+    fn read<T: Copy>(&self, index: usize, zero: T, convert: impl Fn(ComponentType, &[u8]) -> T) -> Result<Elements<T>> {
+        let accessor = &self.root.accessors[index];
+        let refuse = |message: &str| self.refuse(format!("accessors[{index}]: {message}"));
+        let (Checked::Valid(kind), Checked::Valid(shape)) = (&accessor.component_type, &accessor.type_) else {
+            return Err(refuse("its type or component type is unknown"));
+        };
+        let (kind, components) = (kind.0, shape.multiplicity());
+        if matches!(shape, Type::Mat2 | Type::Mat3 | Type::Mat4) {
+            return Err(refuse("matrices are not read here"));
+        }
+        let element = kind.size() * components;
+        let values = match accessor.buffer_view {
+            Some(view) => {
+                let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
+                let layout = self.layout(index, view, offset, accessor.count.0, element)?;
+                let count = accessor.count.0 as usize;
+                let mut values = Vec::with_capacity(count * components);
+                for start in (0..count).map(|i| i * layout.stride) {
+                    let bytes = &layout.bytes[start..start + element];
+                    values.extend(bytes.chunks_exact(kind.size()).map(|component| convert(kind, component)));
+                }
+                values
+            }
+            None if accessor.count.0 > MOST_UNBACKED => return Err(refuse("it has no data for so many elements")),
+            None => vec![zero; accessor.count.0 as usize * components],
+        };
+        let mut elements = Elements { components, values };
+        self.replace_sparse(index, kind, &mut elements, convert)?;
+        Ok(elements)
+    }
+
+    /// The bytes of `count` elements of `element` bytes from `offset` in a view, all of them there.
+    fn layout(
+        &self,
+        accessor: usize,
+        view: Index<buffer::View>,
+        offset: u64,
+        count: u64,
+        element: usize,
+    ) -> Result<Layout<'_>> {
+        let refuse = |message: String| self.refuse(format!("accessors[{accessor}]: {message}"));
+        let view_index = view.value();
+        let view = &self.root.buffer_views[view_index];
+        let stride = view.byte_stride.map_or(element, |stride| stride.0);
+        if stride < element {
+            return Err(refuse(format!(
+                "bufferViews[{view_index}].byteStride {stride} is less than an element's {element} bytes"
+            )));
+        }
+        let start = view.byte_offset.map_or(0, |offset| offset.0);
+        let bytes = &self.buffers[view.buffer.value()];
+        let whole = usize::try_from(start).ok().zip(usize::try_from(view.byte_length.0).ok());
+        let view_bytes = whole.and_then(|(start, length)| bytes.get(start..start.checked_add(length)?));
+        let view_bytes = view_bytes.ok_or_else(|| {
+            refuse(format!("bufferViews[{view_index}] does not fit into buffers[{}]", view.buffer.value()))
+        })?;
+        let needed = count
+            .checked_sub(1)
+            .and_then(|steps| steps.checked_mul(stride as u64)?.checked_add(element as u64)?.checked_add(offset));
+        match needed {
+            Some(needed) if needed <= view_bytes.len() as u64 => {
+                Ok(Layout { bytes: &view_bytes[offset as usize..], stride })
+            }
+            _ => Err(refuse(format!(
+                "{count} elements do not fit into the {} bytes of bufferViews[{view_index}]",
+                view_bytes.len()
+            ))),
+        }
+    }
+
+    fn replace_sparse<T: Copy>(
+        &self,
+        index: usize,
+        kind: ComponentType,
+        elements: &mut Elements<T>,
+        convert: impl Fn(ComponentType, &[u8]) -> T,
+    ) -> Result<()> {
+        let Some(sparse) = &self.root.accessors[index].sparse else { return Ok(()) };
+        let refuse = |message: &str| self.refuse(format!("accessors[{index}].sparse: {message}"));
+        let Checked::Valid(index_kind) = &sparse.indices.component_type else {
+            return Err(refuse("its indices are of an unknown type"));
+        };
+        let index_kind = index_kind.0;
+        let (count, components) = (sparse.count.0, elements.components);
+        let element = kind.size() * components;
+        let places =
+            self.layout(index, sparse.indices.buffer_view, sparse.indices.byte_offset.0, count, index_kind.size())?;
+        let values = self.layout(index, sparse.values.buffer_view, sparse.values.byte_offset.0, count, element)?;
+        for i in 0..count as usize {
+            let place = integer(index_kind, &places.bytes[i * places.stride..]) as usize;
+            let target = elements
+                .values
+                .get_mut(place.saturating_mul(components)..(place.saturating_add(1)).saturating_mul(components));
+            let target = target.ok_or_else(|| refuse("an index lies beyond the accessor's end"))?;
+            let bytes = &values.bytes[i * values.stride..][..element];
+            for (value, component) in target.iter_mut().zip(bytes.chunks_exact(kind.size())) {
+                *value = convert(kind, component);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn is_unsigned(kind: ComponentType) -> bool {
+    matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
+}
