@@ -4,6 +4,7 @@ use super::Document;
 use crate::error::Result;
 use ::gltf::json::accessor::{ComponentType, Type};
 use ::gltf::json::{buffer, validation::Checked, Index};
+use rayon::prelude::*;
 
 /// Most elements of an accessor that no buffer view backs: there the count alone decides what is allocated.
 const MOST_UNBACKED: u64 = 1 << 26;
@@ -53,11 +54,51 @@ impl Document<'_> {
 
     /// Elements of a scalar accessor of unsigned integers.
     pub fn indices(&self, index: usize) -> Result<Vec<u32>> {
+        let refuse = |message: &str| Err(self.refuse(format!("accessors[{index}]: {message}")));
         let elements = self.read(index, 0, integer)?;
-        match &self.root.accessors[index].component_type {
-            Checked::Valid(kind) if elements.components == 1 && is_unsigned(kind.0) => Ok(elements.values),
-            _ => Err(self.refuse(format!("accessors[{index}]: indices must be unsigned integer scalars"))),
+        let restart = match &self.root.accessors[index].component_type {
+            Checked::Valid(kind) if kind.0 == ComponentType::U8 => u32::from(u8::MAX),
+            Checked::Valid(kind) if kind.0 == ComponentType::U16 => u32::from(u16::MAX),
+            Checked::Valid(kind) if kind.0 == ComponentType::U32 => u32::MAX,
+            _ => return refuse("indices must be unsigned integers"),
+        };
+        if elements.components != 1 {
+            return refuse("indices must be scalars");
         }
+        if elements.values.contains(&restart) {
+            return refuse(&format!("an index is {restart}, which is reserved for primitive restart"));
+        }
+        Ok(elements.values)
+    }
+
+    /// Warns of accessors whose data do not keep to their min and max, or are not finite.
+    pub fn check_data(&mut self) {
+        let faults: Vec<String> =
+            (0..self.root.accessors.len()).into_par_iter().filter_map(|index| self.data_fault(index)).collect();
+        faults.into_iter().for_each(|fault| self.warnings.add(fault));
+    }
+
+    fn data_fault(&self, index: usize) -> Option<String> {
+        let accessor = &self.root.accessors[index];
+        let Elements { components, values } = self.read(index, 0.0, |kind, bytes| number(kind, false, bytes)).ok()?;
+        if let Some(bad) = values.iter().find(|value| !value.is_finite()) {
+            return Some(format!("accessors[{index}]: its data contain {bad}"));
+        }
+        for (name, declared, pick) in
+            [("min", &accessor.min, f32::min as fn(f32, f32) -> f32), ("max", &accessor.max, f32::max)]
+        {
+            let Some(declared) = declared.as_ref().and_then(|bounds| bounds.as_array()) else { continue };
+            for (component, declared) in declared.iter().enumerate().take(components) {
+                let own = values.iter().skip(component).step_by(components).copied().reduce(pick)?;
+                let declared = declared.as_f64()? as f32;
+                if own != declared {
+                    return Some(format!(
+                        "accessors[{index}].{name}[{component}] is {declared}, but its data say {own}"
+                    ));
+                }
+            }
+        }
+        None
     }
 
     fn read<T: Copy>(&self, index: usize, zero: T, convert: impl Fn(ComponentType, &[u8]) -> T) -> Result<Elements<T>> {
@@ -110,7 +151,7 @@ impl Document<'_> {
             )));
         }
         let start = view.byte_offset.map_or(0, |offset| offset.0);
-        let bytes = &self.buffers[view.buffer.value()];
+        let bytes = self.buffers[view.buffer.value()].as_ref().map_err(|fault| refuse(fault.clone()))?;
         let whole = usize::try_from(start).ok().zip(usize::try_from(view.byte_length.0).ok());
         let view_bytes = whole.and_then(|(start, length)| bytes.get(start..start.checked_add(length)?));
         let view_bytes = view_bytes.ok_or_else(|| {
@@ -161,8 +202,4 @@ impl Document<'_> {
         }
         Ok(())
     }
-}
-
-fn is_unsigned(kind: ComponentType) -> bool {
-    matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
 }

@@ -1,49 +1,71 @@
 //! Content of buffers: the BIN chunk, data URIs, files beside the document.
 
 use super::Warnings;
-use crate::error::{Error, Result};
-use ::gltf::json::Root;
+use ::gltf::json::{Buffer, Root};
 use base64::{engine::general_purpose, Engine};
 use std::path::Path;
 
 /// Largest buffer, so that a declared length alone allocates nothing absurd.
 const LARGEST: u64 = 1 << 34;
 
-/// Loads every buffer, each at least as long as it declares.
+/// Loads every buffer, each at least as long as it declares. One that cannot be had refuses the file only when something
+/// that is drawn needs it.
 pub(super) fn load(
     root: &Root,
     binary: Option<&[u8]>,
-    file: &str,
     folder: Option<&Path>,
     warnings: &mut Warnings,
-) -> Result<Vec<Vec<u8>>> {
+) -> Vec<Result<Vec<u8>, String>> {
     let mut buffers = Vec::new();
     for (index, buffer) in root.buffers.iter().enumerate() {
-        let refuse = |message: String| Error::content(file, format!("buffers[{index}]: {message}"));
+        let binary = binary.filter(|_| index == 0);
+        let bytes = load_one(buffer, binary).and_then(|bytes| match bytes {
+            Some(bytes) => Ok(bytes),
+            None => read_beside(buffer.uri.as_deref().unwrap_or_default(), folder),
+        });
         let declared = buffer.byte_length.0;
-        if declared == 0 || declared > LARGEST {
-            return Err(refuse(format!("byteLength {declared} is not a sensible length")));
-        }
-        let bytes = match (&buffer.uri, binary) {
-            (Some(uri), _) if uri.starts_with("data:") => decode_data_uri(uri).map_err(refuse)?,
-            (Some(uri), _) => read_beside(uri, folder).map_err(refuse)?,
-            (None, Some(binary)) if index == 0 => binary.to_vec(),
-            (None, _) => return Err(refuse("it has no uri, and there is no BIN chunk for it".into())),
-        };
-        if (bytes.len() as u64) < declared {
-            return Err(refuse(format!("byteLength is {declared}, but there are only {} bytes", bytes.len())));
-        }
+        let bytes = bytes.and_then(|bytes| match bytes.len() as u64 {
+            length if length < declared => Err(format!("byteLength is {declared}, but there are only {length} bytes")),
+            _ => Ok(bytes),
+        });
         // A BIN chunk may be padded by up to three bytes.
-        if bytes.len() as u64 > declared + if buffer.uri.is_none() { 3 } else { 0 } {
-            warnings.add(format!("buffers[{index}]: byteLength is {declared}, but there are {} bytes", bytes.len()));
+        let most = declared + if buffer.uri.is_none() { 3 } else { 0 };
+        match bytes {
+            Ok(bytes) => {
+                if bytes.len() as u64 > most {
+                    let length = bytes.len();
+                    warnings.add(format!("buffers[{index}]: byteLength is {declared}, but there are {length} bytes"));
+                }
+                buffers.push(Ok(bytes));
+            }
+            Err(fault) => {
+                let fault = format!("buffers[{index}]: {fault}");
+                warnings.add(fault.clone());
+                buffers.push(Err(fault));
+            }
         }
-        buffers.push(bytes);
     }
-    Ok(buffers)
+    buffers
+}
+
+/// The bytes of a buffer that is part of the document; `None` for one in a file of its own.
+fn load_one(buffer: &Buffer, binary: Option<&[u8]>) -> Result<Option<Vec<u8>>, String> {
+    match (&buffer.uri, binary) {
+        _ if buffer.byte_length.0 == 0 || buffer.byte_length.0 > LARGEST => {
+            Err(format!("byteLength {} is not a sensible length", buffer.byte_length.0))
+        }
+        (Some(uri), _) if uri.starts_with("data:") => decode_data_uri(uri).map(Some),
+        (Some(_), _) => Ok(None),
+        (None, Some(binary)) => Ok(Some(binary.to_vec())),
+        (None, None) => Err("it has no uri, and there is no BIN chunk for it".into()),
+    }
 }
 
 fn decode_data_uri(uri: &str) -> Result<Vec<u8>, String> {
     let (head, data) = uri.split_once(',').ok_or("a data URI without a comma")?;
+    if head.contains(";;") {
+        return Err("the data URI has an empty parameter".into());
+    }
     if !head.ends_with(";base64") {
         return Ok(percent_encoding::percent_decode_str(data).collect());
     }

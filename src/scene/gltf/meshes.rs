@@ -67,16 +67,15 @@ impl Document<'_> {
         if triangles.is_empty() || (mode == Mode::Triangles && corners.len() % 3 != 0) {
             self.warnings.add(format!("dropped: {place} has {} corners, not whole triangles", corners.len()));
         }
-        let [normals, colors] = [normals, colors].map(Option::transpose);
+        let (normals, colors) = (normals.transpose()?.unwrap_or_default(), colors.transpose()?.unwrap_or_default());
+        let in_range = |color: &Vec3| color.cmpge(Vec3::ZERO).all() && color.cmple(Vec3::ONE).all();
+        if !colors.iter().all(in_range) {
+            self.warnings.add(format!("{place}: COLOR_0 has values outside 0 to 1; they were clamped"));
+        }
         Ok(Some(Mesh {
             positions,
-            normals: normals?.unwrap_or_default(),
-            // Sixteen times white is still a colour; NaN and infinity are not.
-            colors: colors?
-                .unwrap_or_default()
-                .into_iter()
-                .map(|color| finite(color).clamp(Vec3::ZERO, Vec3::splat(16.0)))
-                .collect(),
+            normals,
+            colors: colors.into_iter().map(|color| finite(color).clamp(Vec3::ZERO, Vec3::ONE)).collect(),
             triangles,
             ..Mesh::default()
         }))

@@ -17,7 +17,7 @@ mod nodes;
 
 use super::Scene;
 use crate::error::{Error, Result};
-use ::gltf::json::{validation::Validate, Path as JsonPath, Root};
+use ::gltf::json::Root;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -69,7 +69,8 @@ pub fn parse(
 ) -> Result<Scene> {
     let container = container::split(bytes).map_err(|message| Error::content(file, message))?;
     let mut document = Document::new(container, file)?;
-    document.buffers = buffers::load(&document.root, container.binary, file, folder, &mut document.warnings)?;
+    document.buffers = buffers::load(&document.root, container.binary, folder, &mut document.warnings);
+    document.check_data();
     document.note_what_is_not_shown();
     let mut scene = Scene { name, ..Scene::default() };
     document.add_materials(&mut scene);
@@ -85,46 +86,24 @@ struct Document<'a> {
     file: &'a str,
     /// As the `gltf` crate types it.
     root: Root,
-    /// Content of each buffer.
-    buffers: Vec<Vec<u8>>,
+    /// Content of each buffer, or why there is none.
+    buffers: Vec<Result<Vec<u8>, String>>,
     warnings: Warnings,
 }
 
 impl<'a> Document<'a> {
     fn new(container: container::Container, file: &'a str) -> Result<Self> {
         let refuse = |message: String| Error::content(file, message);
-        let value: Value = serde_json::from_slice(container.json)
+        let mut value: Value = serde_json::from_slice(container.json)
             .map_err(|error| refuse(format!("the JSON is not valid: {error}")))?;
+        check::normalise(&mut value);
         let mut warnings = Warnings::default();
         container.warnings.iter().for_each(|warning| warnings.add(*warning));
         check::version(&value).map_err(refuse)?;
         check::required_extensions(&value).map_err(refuse)?;
         check::document(&value, container.binary.is_some(), &mut warnings).map_err(refuse)?;
-        let root: Root =
-            serde_json::from_slice(container.json).map_err(|error| refuse(format!("not a glTF document: {error}")))?;
-        let document = Self { file, root, buffers: Vec::new(), warnings };
-        document.validate()?;
-        Ok(document)
-    }
-
-    /// The `gltf` crate's own validation; what it holds against files that can be shown all the same is left to `check`.
-    fn validate(&self) -> Result<()> {
-        let mut faults: Vec<String> = Vec::new();
-        let mut report = |path: &dyn Fn() -> JsonPath, error| {
-            let path = path().as_str().to_owned();
-            let harmless = ["bufferView", "min", "max", "byteStride"].iter().any(|end| path.ends_with(end))
-                || path.starts_with("extensionsRequired")
-                || path.contains("attributes")
-                || path.starts_with("cameras");
-            if !harmless {
-                faults.push(format!("{path}: {error}"));
-            }
-        };
-        self.root.validate(&self.root, JsonPath::new, &mut report);
-        match faults.first() {
-            Some(fault) => Err(self.refuse(fault)),
-            None => Ok(()),
-        }
+        let root = typed(container.json, value).map_err(|error| refuse(format!("not a glTF document: {error}")))?;
+        Ok(Self { file, root, buffers: Vec::new(), warnings })
     }
 
     fn refuse(&self, message: impl ToString) -> Error {
@@ -150,6 +129,17 @@ impl<'a> Document<'a> {
             }
         }
     }
+}
+
+/// The document in the types of the `gltf` crate; if it is too strict for it, without what is not read anyway.
+fn typed(json: &[u8], mut value: Value) -> serde_json::Result<Root> {
+    serde_json::from_slice(json).or_else(|_| {
+        for unused in ["animations", "skins", "textures", "images", "samplers"] {
+            value.as_object_mut().and_then(|root| root.remove(unused));
+        }
+        // Through text, because the crate keeps extras as raw text.
+        serde_json::from_str(&value.to_string())
+    })
 }
 
 /// Warnings, each text once with the number of times it was given.
