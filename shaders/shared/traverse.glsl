@@ -5,6 +5,8 @@
 
 const int NOTHING = int(0x80000000); // no node: the stack is empty
 const int REGISTERS = 10;
+/// Nodes after which a walk is given up: far more than any driver's own limit, see Budget.
+const uint MOST_ROUNDS = 1u << 20u;
 
 /// The ray in grid coordinates, where a child's u16 box is compared without decoding it.
 struct GridRay {
@@ -52,34 +54,48 @@ Visit visit(GridRay ray, int node, float t_max) {
                  int(swapped ? child_1.w : child_0.w), int(swapped ? child_0.w : child_1.w));
 }
 
+/// What one invocation may still do, and whether it was stopped.
+///
+/// Mesa 22.3 silently ends every loop when one invocation, or another in its subgroup, has made 65 535 rounds, nested loops
+/// added up. So every loop here has a second way out, by a count of nodes: only then does the compiler not take for granted
+/// that a loop ended as it should, and what is left to do behind the loop tells whether it was cut short.
+struct Budget {
+    /// Nodes visited.
+    uint rounds;
+    bool cut;
+};
+
 /// Tests the triangles of a leaf. A leaf's reference is ~(first · 16 + count).
-bool visit_leaf(ShearedRay ray, int leaf, bool culls, inout Hit hit) {
+bool visit_leaf(ShearedRay ray, int leaf, bool culls, inout Budget budget, inout Hit hit) {
     uint reference = uint(~leaf);
     uint triangle = reference >> 4u;
     uint end = triangle + (reference & 15u);
     bool found = false;
-    while (triangle < end) {
+    while (triangle < end && budget.rounds < MOST_ROUNDS) {
         found = intersect_triangle(ray, triangle, culls, hit) || found;
         triangle++;
     }
+    budget.cut = budget.cut || triangle < end;
     return found;
 }
 
-/// Counts a ray whose walk was cut short: Mesa 22.3 ends every loop after 65 535 rounds in one invocation. The host
-/// turns a count above zero into an error: a wrong picture is never written.
-void require_complete(int node) {
-    if (node != NOTHING)
-        atomicAdd(counters[COUNTER_LOST], 1u);
+/// Counts a ray whose walk was cut short. The host turns a count above zero into an error: a wrong picture is never written.
+bool is_complete(int node, Budget budget) {
+    if (node == NOTHING && !budget.cut)
+        return true;
+    atomicAdd(counters[COUNTER_LOST], 1u);
+    return false;
 }
 
 /// The walk with an array for a stack.
-void traverse_deep(GridRay grid, ShearedRay ray, bool any, inout Hit hit) {
+void traverse_deep(GridRay grid, ShearedRay ray, bool any, Budget budget, inout Hit hit) {
     int stack[MAX_TREE_DEPTH];
     int height = 0;
     int node = 0;
-    while (node != NOTHING) {
+    while (node != NOTHING && budget.rounds < MOST_ROUNDS) {
         bool found = false;
         if (node >= 0) {
+            budget.rounds++;
             Visit next = visit(grid, node, hit.t);
             if (next.both)
                 stack[height++] = next.farther;
@@ -87,11 +103,11 @@ void traverse_deep(GridRay grid, ShearedRay ray, bool any, inout Hit hit) {
             if (!next.none)
                 continue;
         } else {
-            found = visit_leaf(ray, node, SINGLE_SIDED && !any, hit);
+            found = visit_leaf(ray, node, SINGLE_SIDED && !any, budget, hit);
         }
         node = height > 0 && !(any && found) ? stack[--height] : NOTHING;
     }
-    require_complete(node);
+    is_complete(node, budget);
 }
 
 /// Finds the nearest hit, or with `any` some hit, closer than hit.t. A miss leaves hit as it was.
@@ -102,9 +118,11 @@ void traverse(Ray world_ray, bool any, inout Hit hit) {
     [[unroll]] for (int i = 0; i < REGISTERS; i++)
         stack[i] = NOTHING;
     int overflow = 0;
+    Budget budget = Budget(0u, false);
     int node = 0;
-    while (node != NOTHING) {
-        while (node >= 0) {
+    while (node != NOTHING && budget.rounds < MOST_ROUNDS) {
+        while (node >= 0 && budget.rounds < MOST_ROUNDS) {
+            budget.rounds++;
             Visit next = visit(grid, node, hit.t);
             node = next.none ? stack[0] : next.nearer;
             overflow |= next.both ? stack[REGISTERS - 1] ^ NOTHING : 0;
@@ -119,9 +137,9 @@ void traverse(Ray world_ray, bool any, inout Hit hit) {
                 stack[REGISTERS - 1] = NOTHING;
             }
         }
-        if (node == NOTHING)
+        if (node >= 0 || node == NOTHING)
             break;
-        bool found = visit_leaf(ray, node, SINGLE_SIDED && !any, hit);
+        bool found = visit_leaf(ray, node, SINGLE_SIDED && !any, budget, hit);
         node = stack[0];
         [[unroll]] for (int i = 0; i < REGISTERS - 1; i++)
             stack[i] = stack[i + 1];
@@ -131,9 +149,8 @@ void traverse(Ray world_ray, bool any, inout Hit hit) {
             overflow = 0;
         }
     }
-    require_complete(node);
-    if (overflow != 0)
-        traverse_deep(grid, ray, any, hit);
+    if (is_complete(node, budget) && overflow != 0)
+        traverse_deep(grid, ray, any, budget, hit);
 }
 
 /// The nearest hit; its triangle is NO_TRIANGLE when there is none.

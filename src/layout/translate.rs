@@ -51,6 +51,7 @@ fn walk(file: &str, source: &str, mut declare: impl FnMut(&str, &str) -> Option<
 /// `layout.glsl` → constants and `#[repr(C)]` structs.
 pub fn layout(source: &str) -> Result<String, Unknown> {
     let mut out = String::new();
+    let mut members = String::new();
     let mut structs: Vec<String> = Vec::new();
     let mut inside = false;
     walk("layout.glsl", source, |line, doc| {
@@ -63,6 +64,8 @@ pub fn layout(source: &str) -> Result<String, Unknown> {
             let (kind, name) = line.strip_suffix(';')?.split_once(' ')?;
             let known = structs.iter().find(|known| *known == kind).cloned();
             let kind = rust_type(kind).map(str::to_owned).or(known)?;
+            let holder = structs.last()?;
+            writeln!(members, "    (\"{holder}\", \"{name}\", std::mem::offset_of!({holder}, {name})),").ok()?;
             writeln!(out, "    /// {doc}\n    pub {name}: {kind},").ok()
         } else if let Some(name) = line.strip_prefix("struct ").and_then(|rest| rest.strip_suffix(" {")) {
             inside = true;
@@ -75,7 +78,13 @@ pub fn layout(source: &str) -> Result<String, Unknown> {
             writeln!(out, "/// {doc}\npub const {name}: {} = {value};", rust_type(kind)?).ok()
         }
     })?;
-    Ok(out)
+    let doc = "/// Struct, member and byte offset of everything in the contract.";
+    Ok(format!(
+        "{out}{doc}
+pub const MEMBERS: &[(&str, &str, usize)] = &[
+{members}];
+"
+    ))
 }
 
 /// `bindings.glsl` → one constant a slot and the list of all bindings.

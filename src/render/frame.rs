@@ -218,7 +218,7 @@ impl Totals {
         match counters[COUNTER_LOST as usize] {
             0 => Ok(()),
             lost => Err(Error::Device(format!(
-                "the driver cut the traversal of {lost} rays short (Mesa before 23 ends loops after 65 535 rounds); \
+                "{lost} rays meet more boxes and triangles than this driver's loops allow; \
                  the picture would be wrong and was not written"
             ))),
         }

@@ -69,9 +69,17 @@ impl Renderer {
     /// # Errors
     /// `NoDevice` when there is none; `Vulkan` when the driver refuses.
     pub fn new(choice: &DeviceChoice, validate: bool) -> Result<Self> {
+        Self::with_fetch(choice, validate, None)
+    }
+
+    /// As [`Renderer::new`], with a wish how kernels fetch the tree and the triangles.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn with_fetch(choice: &DeviceChoice, validate: bool, fetch: Option<Fetch>) -> Result<Self> {
         let start = Instant::now();
         let instance = Instance::new(validate)?;
-        let device = Device::open(&instance, choice)?;
+        let device = Device::open(&instance, choice, fetch)?;
         let slots: Vec<BindingSlot> = binding::ALL
             .iter()
             .map(|binding| BindingSlot {

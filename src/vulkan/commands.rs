@@ -1,5 +1,6 @@
 //! Recording: bind, push, dispatch, barrier, timestamp; then submit and wait.
 
+use super::device::lock;
 use super::{failed, Bindings, Buffer, Device, Kernel};
 use crate::error::Result;
 use ash::vk;
@@ -193,8 +194,11 @@ impl Commands {
         unsafe { raw.end_command_buffer(self.buffer) }.map_err(failed("end commands"))?;
         let buffers = [self.buffer];
         let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
-        // SAFETY: the queue is used by one thread at a time; fence and commands are fresh.
-        unsafe { raw.queue_submit(self.device.queue, &submit, self.fence) }.map_err(failed("submit"))?;
+        {
+            let queue = lock(&self.device.queue);
+            // SAFETY: the lock keeps other threads off the queue; fence and commands are fresh.
+            unsafe { raw.queue_submit(*queue, &submit, self.fence) }.map_err(failed("submit"))?;
+        }
         // SAFETY: the fence was just submitted.
         unsafe { raw.wait_for_fences(&[self.fence], true, u64::MAX) }.map_err(failed("wait for the device"))?;
         self.read_timestamps()

@@ -81,7 +81,8 @@ pub enum Fetch {
 /// An open device with one compute queue.
 pub struct Device {
     pub(super) raw: ash::Device,
-    pub(super) queue: vk::Queue,
+    /// One submission at a time, from any thread.
+    pub(super) queue: Mutex<vk::Queue>,
     pub(super) queue_family: u32,
     pub(super) utils: Option<debug_utils::Device>,
     /// Freed by hand before the device is destroyed.
@@ -114,18 +115,23 @@ impl Device {
         Ok(instance.physical_devices()?.into_iter().map(|device| describe(instance, device)).collect())
     }
 
-    /// Opens a device.
+    /// Opens a device. Without a wish, kernels fetch in the way that suits it.
     ///
     /// # Errors
     /// `NoDevice` when none fits the choice; `Vulkan` when the driver refuses.
-    pub fn open(instance: &Arc<Instance>, choice: &DeviceChoice) -> Result<Arc<Self>> {
+    pub fn open(instance: &Arc<Instance>, choice: &DeviceChoice, fetch: Option<Fetch>) -> Result<Arc<Self>> {
         let physical = instance.physical_devices()?;
         let infos: Vec<DeviceInfo> = physical.iter().map(|device| describe(instance, *device)).collect();
         let index = choose(&infos, choice)?;
-        Self::open_physical(instance, physical[index], infos[index].clone())
+        Self::open_physical(instance, physical[index], infos[index].clone(), fetch)
     }
 
-    fn open_physical(instance: &Arc<Instance>, physical: vk::PhysicalDevice, info: DeviceInfo) -> Result<Arc<Self>> {
+    fn open_physical(
+        instance: &Arc<Instance>,
+        physical: vk::PhysicalDevice,
+        info: DeviceInfo,
+        fetch: Option<Fetch>,
+    ) -> Result<Arc<Self>> {
         let (queue_family, timestamp_bits) = compute_family(instance, physical)
             .ok_or_else(|| Error::NoDevice(format!("{} has no compute queue", info.name)))?;
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
@@ -152,17 +158,17 @@ impl Device {
         let utils = instance.has_debug_utils.then(|| debug_utils::Device::new(&instance.raw, &raw));
         // SAFETY: the physical device belongs to the instance.
         let properties = unsafe { instance.raw.get_physical_device_properties(physical) };
-        let fetch = if info.max_texels >= ENOUGH_TEXELS { Fetch::Texel } else { Fetch::Storage };
+        let suitable = if info.max_texels >= ENOUGH_TEXELS { Fetch::Texel } else { Fetch::Storage };
         Ok(Arc::new(Self {
             raw,
-            queue,
+            queue: Mutex::new(queue),
             queue_family,
             utils,
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             timestamp_period: (timestamp_bits > 0).then_some(f64::from(properties.limits.timestamp_period)),
             memory: Mutex::default(),
             info,
-            fetch,
+            fetch: fetch.unwrap_or(suitable),
             instance: instance.clone(),
         }))
     }
