@@ -22,7 +22,15 @@ fn main() -> ExitCode {
     if let Err(error) = handler {
         eprintln!("glimt: warning: Ctrl-C will not clean up: {error}");
     }
-    match cli::Cli::parse().run(&context) {
+    let command = match cli::Cli::try_parse() {
+        Ok(command) => command,
+        Err(answer) if !answer.use_stderr() => answer.exit(),
+        Err(error) => {
+            eprintln!("glimt: {}", one_line(&error));
+            return ExitCode::from(2);
+        }
+    };
+    match command.run(&context) {
         Ok(outcome) => {
             eprint!("{}", outcome.stderr);
             let mut stdout = std::io::stdout().lock();
@@ -41,4 +49,14 @@ fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// What is wrong with the command line and the tip, if there is one, without the usage.
+fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let lines =
+        text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage") && !line.starts_with("For more"));
+    let said: Vec<&str> =
+        lines.filter(|line| !line.is_empty()).map(|line| line.trim_start_matches("error: ")).collect();
+    format!("{} (see glimt --help)", said.join("; "))
 }

@@ -1,1 +1,22 @@
+//! All tests, one binary.
+//!
+//! * `architecture` — who knows whom, where `unsafe` and printing may be
+//! * `layout` — the contract: Rust offsets against SPIR-V decorations, unknown lines
+//! * `bvh` — invariants on random and hostile boxes, determinism
+//! * `scene` — shapes, transforms, cameras, materials
+//! * `gltf` — accessors of every kind, hierarchies, faults, written by the tests themselves
+//! * `frames` — pictures: against the reference, closed forms, determinism, features
+//! * `cli` — the program: exit codes, messages, files
+//! * `corpus` — real and broken files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
 
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
+
+mod architecture;
+mod bvh;
+mod cli;
+mod corpus;
+mod frames;
+mod gltf;
+mod layout;
+mod scene;
+mod support;

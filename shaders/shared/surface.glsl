@@ -2,8 +2,8 @@
 
 struct Surface {
     vec3 position;
-    /// Bound on the rounding error of position, per axis.
-    vec3 error;
+    /// Bound on the rounding error of position, the largest of the three axes.
+    float error;
     /// Unit normal of the triangle, on the side that the ray came from.
     vec3 geometric_normal;
     /// Unit interpolated normal, on the same side.
@@ -11,6 +11,7 @@ struct Surface {
     /// Vertex colour.
     vec3 tint;
     uint material;
+    uint primitive;
 };
 
 vec3 interpolate(vec3 weights, uvec4 a, uvec4 b, uvec4 c) {
@@ -34,7 +35,8 @@ Surface surface_at(HitItem item) {
     // γ(7)·Σ|λᵢ pᵢ| (Pharr, Jakob and Humphreys, 4th ed., 6.8.4), not by the length of the ray; 16 u covers γ(7) and the
     // next ray's own subtraction.
     surface.position = weights.x * a + weights.y * b + weights.z * c;
-    surface.error = 9.6e-7 * (abs(weights.x * a) + abs(weights.y * b) + abs(weights.z * c));
+    vec3 magnitude = abs(weights.x * a) + abs(weights.y * b) + abs(weights.z * c);
+    surface.error = 9.6e-7 * max(magnitude.x, max(magnitude.y, magnitude.z));
     // Edges are brought to size 1 first, so that tiny or huge triangles neither underflow nor overflow.
     vec3 edge_b = b - a;
     vec3 edge_c = c - a;
@@ -54,13 +56,13 @@ Surface surface_at(HitItem item) {
         surface.tint = interpolate(weights, FETCH(colors, attributes), FETCH(colors, attributes + 1u),
                                    FETCH(colors, attributes + 2u));
     surface.material = texel_b.w;
+    surface.primitive = texel_a.w;
     return surface;
 }
 
 /// Start of a ray that leaves the surface: moved along the geometric normal, to the side the ray goes to, by the error
-/// bound's extent in that direction.
+/// bound. The triangle itself is excluded by its number; this clears its neighbours.
 vec3 leave_surface(Surface surface, vec3 direction) {
     float side = dot(surface.geometric_normal, direction) < 0.0 ? -1.0 : 1.0;
-    vec3 n = side * surface.geometric_normal;
-    return surface.position + n * dot(abs(n), surface.error);
+    return surface.position + surface.geometric_normal * (side * surface.error);
 }

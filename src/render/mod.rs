@@ -36,6 +36,9 @@ pub struct Renderer {
     layout: Arc<Layout>,
     /// Compiled kernels by name and features: a second pipeline of the same code would be compiled again.
     kernels: Mutex<HashMap<(&'static str, Features), Arc<Kernel>>>,
+    /// One frame at a time: a frame takes the whole device anyway, and the validation layers of 1.3.239 crash when one
+    /// thread frees its commands while another waits for the queue.
+    frames: Mutex<()>,
     opened_in_ms: f64,
 }
 
@@ -92,7 +95,13 @@ impl Renderer {
             })
             .collect();
         let layout = Layout::new(&device, &slots, size_of::<Step>() as u32)?;
-        Ok(Self { device, layout, kernels: Mutex::default(), opened_in_ms: milliseconds(start) })
+        Ok(Self {
+            device,
+            layout,
+            kernels: Mutex::default(),
+            frames: Mutex::default(),
+            opened_in_ms: milliseconds(start),
+        })
     }
 
     /// The open device.
@@ -157,6 +166,7 @@ impl Renderer {
         bvh: &Bvh,
         center: glam::DVec3,
     ) -> Result<(Film, Report)> {
+        let _frame = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
         let Prepared { soup, view, features } = prepared;
         let plan = Plan::new(scene, soup, view, *features, bvh.nodes.len(), options.samples_in_flight);
         let start = Instant::now();

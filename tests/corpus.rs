@@ -1,0 +1,211 @@
+//! Real models, broken files and golden silhouettes of the shared corpus.
+
+use super::support::{assert_alike, corpus, draw, draw_reference};
+use glam::DVec3;
+use glimt::scene::{gltf, Background, CameraChoice};
+use glimt::{film, Options, Result, Scene};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+fn load(path: &Path) -> Result<Scene> {
+    gltf::read(path, None)
+}
+
+/// A row of the manifest.
+struct Model {
+    path: String,
+    bytes: u64,
+    triangles: usize,
+    required: String,
+    used: String,
+    features: String,
+}
+
+fn manifest(corpus: &Path) -> Vec<Model> {
+    let table = std::fs::read_to_string(corpus.join("MANIFEST.tsv")).unwrap();
+    let rows = table.lines().skip(1).map(|line| {
+        let cells: Vec<&str> = line.split('\t').collect();
+        let [_, path, bytes, _, triangles, used, required, features, ..] = cells[..] else { panic!("{line}") };
+        Model {
+            path: path.into(),
+            bytes: bytes.parse().unwrap(),
+            triangles: triangles.parse().unwrap(),
+            required: required.into(),
+            used: used.into(),
+            features: features.into(),
+        }
+    });
+    rows.collect()
+}
+
+fn is_supported(model: &Model) -> bool {
+    model.required.split(',').all(|name| name == "-" || gltf::SUPPORTED_EXTENSIONS.contains(&name))
+}
+
+/// Every model that requires nothing we lack renders, with all its triangles, and shows more than one colour; the others
+/// are refused with the extension's name.
+#[test]
+fn models_render() {
+    let Some(corpus) = corpus() else { return };
+    let (mut drawn, mut refused) = (0, 0);
+    let mut faults = Vec::new();
+    for model in manifest(&corpus) {
+        let scene = load(&corpus.join(&model.path));
+        if !is_supported(&model) {
+            let message = scene.err().map(|error| error.to_string()).unwrap_or_default();
+            if !message.contains("it requires") {
+                faults.push(format!("{}: {message}", model.path));
+            }
+            refused += 1;
+            continue;
+        }
+        let scene = scene.unwrap_or_else(|error| panic!("{error}"));
+        let background = Background::Constant(DVec3::new(0.2, 0.4, 0.6));
+        let (film, report) = draw(&scene, &Options { size: (128, 96), background, ..Options::default() });
+        let first = film.srgb8(0);
+        if (0..film.pixels.len()).all(|pixel| film.srgb8(pixel) == first) {
+            faults.push(format!("{}: one colour only", model.path));
+        }
+        if report.scene.triangles != model.triangles {
+            faults.push(format!("{}: {} triangles, not {}", model.path, report.scene.triangles, model.triangles));
+        }
+        drawn += 1;
+    }
+    println!("{drawn} models drawn, {refused} refused for an extension");
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
+#[test]
+fn the_smallest_models_agree_with_the_reference() {
+    let Some(corpus) = corpus() else { return };
+    let mut models: Vec<Model> = manifest(&corpus).into_iter().filter(is_supported).collect();
+    models.sort_by_key(|model| (model.bytes, model.path.clone()));
+    for model in models.iter().take(20) {
+        let scene = load(&corpus.join(&model.path)).unwrap();
+        let options = Options { size: (160, 120), ..Options::default() };
+        assert_alike(&model.path, &draw_reference(&scene, &options), &draw(&scene, &options).0);
+    }
+}
+
+/// Share of the frame by which a silhouette differs from a golden's alpha.
+fn silhouette_difference(alpha: &[f32], golden: &Path) -> Option<f64> {
+    let golden = film::read(golden).unwrap();
+    if !golden.has_alpha || golden.pixels.len() != alpha.len() {
+        return None;
+    }
+    let differences = alpha.iter().zip(&golden.pixels).map(|(own, pixel)| f64::from((own - pixel[3]).abs()));
+    Some(differences.sum::<f64>() / alpha.len() as f64)
+}
+
+/// The camera, light and size of a golden, see the corpus' HOW.md.
+fn scenario_options(scenario: &Value, golden: &Path) -> Options {
+    let number = |name: &str| scenario[name].as_f64().unwrap();
+    let target = Some(DVec3::new(number("tx"), number("ty"), number("tz")));
+    let size = film::read(golden).map(|film| (film.width, film.height)).unwrap();
+    Options {
+        size,
+        samples: 4,
+        max_depth: 0,
+        camera: CameraChoice::Orbit { theta: number("theta"), phi: number("phi"), radius: number("radius"), target },
+        fov: Some(number("fov").to_radians()),
+        background: Background::Transparent,
+        ..Options::default()
+    }
+}
+
+/// Scenarios whose geometry needs no skin, morph target, alpha or extension: the silhouette differs from the goldens' alpha by
+/// at most 0.01 of the frame, pixel by pixel, median over renderers.
+#[test]
+fn silhouettes_are_the_goldens() {
+    let Some(corpus) = corpus() else { return };
+    let scenarios: BTreeMap<String, Value> =
+        serde_json::from_slice(&std::fs::read(corpus.join("goldens/scenarios.json")).unwrap()).unwrap();
+    let models = manifest(&corpus);
+    let (mut checked, mut faults) = (0, Vec::new());
+    println!("{:<34} renderers  median difference", "scenario");
+    for (name, scenario) in &scenarios {
+        let own = |model: &&Model| model.path.starts_with(&format!("models/{}/", scenario["model"].as_str().unwrap()));
+        let Some(model) = models.iter().filter(is_supported_ref).find(own) else {
+            println!("{name:<34} needs an extension");
+            continue;
+        };
+        let needs = |feature: &str| model.features.split(',').any(|own| own == feature);
+        if let Some(feature) = ["skin", "morph", "blend", "mask"].into_iter().find(|feature| needs(feature)) {
+            println!("{name:<34} needs {feature}");
+            continue;
+        }
+        let folder = corpus.join("goldens").join(name);
+        let mut goldens: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        goldens.sort();
+        let options = scenario_options(scenario, &goldens[0]);
+        let (film, _) = draw(&load(&corpus.join(&model.path)).unwrap(), &options);
+        let alpha: Vec<f32> = film.pixels.iter().map(|pixel| pixel[3]).collect();
+        let mut differences: Vec<f64> =
+            goldens.iter().filter_map(|golden| silhouette_difference(&alpha, golden)).collect();
+        if scenario["skybox"].as_bool() == Some(true) || differences.is_empty() {
+            println!("{name:<34} has no silhouette: its goldens show the sky");
+            continue;
+        }
+        differences.sort_by(f64::total_cmp);
+        let middle = differences.len() / 2;
+        let median = (differences[middle] + differences[(differences.len() - 1) / 2]) / 2.0;
+        println!("{name:<34} {:>9}  {median:.4}  {}", differences.len(), model.used);
+        checked += 1;
+        if median > 0.01 {
+            faults.push(format!("{name}: {median:.4}"));
+        }
+    }
+    println!("{checked} scenarios checked");
+    assert!(checked >= 15 && faults.is_empty(), "{checked} checked, {faults:?}");
+}
+
+fn is_supported_ref(model: &&Model) -> bool {
+    is_supported(model)
+}
+
+/// The validator's own files: what it calls an error is refused or warned of, except what lies in image data, which are not
+/// read yet; what it accepts is accepted unless the data are missing or it needs what we lack.
+#[test]
+fn invalid_files_are_refused_or_warned_of() {
+    let Some(corpus) = corpus() else { return };
+    let mut reports = Vec::new();
+    let mut folders = vec![corpus.join("invalid")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.to_string_lossy().ends_with(".report.json") {
+                reports.push(path);
+            }
+        }
+    }
+    reports.sort();
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut silent = Vec::new();
+    for report in &reports {
+        let path = PathBuf::from(report.to_string_lossy().strip_suffix(".report.json").unwrap());
+        let verdict: Value = serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap();
+        let is_error = verdict["issues"]["numErrors"].as_u64().unwrap() > 0;
+        let outcome = match (is_error, load(&path)) {
+            (true, Err(_)) => "error, refused",
+            (true, Ok(scene)) if scene.warnings.iter().any(|warning| !warning.contains("has no scene")) => {
+                "error, warned"
+            }
+            (true, Ok(_)) => {
+                silent.push(path.strip_prefix(&corpus).unwrap().display().to_string());
+                "error, silent"
+            }
+            (false, Ok(_)) => "no error, accepted",
+            (false, Err(error)) => {
+                let known = ["minVersion", "there is no BIN chunk for it", "it requires"];
+                assert!(known.iter().any(|known| error.to_string().contains(known)), "refused for no reason: {error}");
+                "no error, refused"
+            }
+        };
+        *counts.entry(outcome).or_default() += 1;
+    }
+    println!("{} files: {counts:?}\nsilent: {silent:#?}", reports.len());
+    assert!(silent.iter().all(|path| path.contains("/image/")), "{silent:#?}");
+}
