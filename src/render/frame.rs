@@ -4,11 +4,12 @@ use super::{upload, Options, Plan, Renderer};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{
-    binding, kernels, Step, COUNTER_LOST, COUNTER_TOTAL, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW, TILE, WORKGROUP,
+    binding, kernels, Step, COUNTERS, COUNTER_LOST, COUNTER_TOTAL, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW, TILE,
+    WORKGROUP,
 };
 use crate::report;
 use crate::scene::{Background, View};
-use crate::vulkan::{Access, Bindings, Buffer, Commands, Kernel};
+use crate::vulkan::{Access, Bindings, Buffer, Commands, Kernel, Memory, Usage};
 use std::sync::atomic::Ordering;
 use std::sync::Arc;
 
@@ -21,6 +22,8 @@ pub(super) struct Frame<'a> {
     // Dropped before the buffers it names.
     bindings: Bindings,
     buffers: Vec<Buffer>,
+    /// Where the host reads: the counters of a wave, then the film of a band.
+    read_back: Buffer,
 }
 
 /// The kernels of the passes that this frame has.
@@ -40,6 +43,10 @@ pub(super) struct Outcome {
     pub queue_bytes: u64,
 }
 
+/// Bytes of all counters, padded so that pixels behind them are aligned.
+const COUNTER_BYTES: usize = (4 * COUNTERS as usize).next_multiple_of(PIXEL_BYTES);
+/// Bytes of a pixel.
+const PIXEL_BYTES: usize = size_of::<[f32; 4]>();
 /// Most dispatches of a wave that are timed one by one.
 const MOST_TIMED: u64 = 16_384;
 
@@ -67,7 +74,9 @@ impl<'a> Frame<'a> {
             })
             .collect::<Result<Vec<_>>>()?;
         let bindings = Bindings::new(&renderer.layout, |slot| &buffers[slot as usize])?;
-        Ok(Self { renderer, view: scene.view, plan, kernels, bindings, buffers })
+        let read_back = COUNTER_BYTES as u64 + u64::from(plan.band_pixels) * PIXEL_BYTES as u64;
+        let read_back = Buffer::new(&renderer.device, "read back", read_back, Usage::Storage, Memory::ReadBack)?;
+        Ok(Self { renderer, view: scene.view, plan, kernels, bindings, buffers, read_back })
     }
 
     /// Records one wave: the whole algorithm.
@@ -108,8 +117,15 @@ impl<'a> Frame<'a> {
         // Radiance: every pass wrote, resolve reads. Film: the wave before wrote, resolve adds.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
         commands.dispatch(&kernels.resolve, bytemuck::bytes_of(&wave), wave.pixels.div_ceil(WORKGROUP));
-        // Film and counters: kernels wrote, the host reads.
-        commands.barrier(Access::ShaderWrite, Access::HostRead);
+        // Film and counters: kernels wrote, copies read.
+        commands.barrier(Access::ShaderWrite, Access::Transfer);
+        commands.copy(&self.buffers[binding::COUNTERS as usize], &self.read_back, 0, COUNTER_BYTES as u64);
+        if wave.finish != 0 {
+            let bytes = u64::from(wave.pixels) * PIXEL_BYTES as u64;
+            commands.copy(&self.buffers[binding::FILM as usize], &self.read_back, COUNTER_BYTES as u64, bytes);
+        }
+        // What was read back: copies wrote, the host reads.
+        commands.barrier(Access::Transfer, Access::HostRead);
     }
 
     /// Makes filled queues ready, with a barrier on either side.
@@ -147,7 +163,7 @@ impl<'a> Frame<'a> {
                 let mut commands = Commands::new(&self.renderer.device, timed)?;
                 self.record(&mut commands, wave);
                 totals.add_times(&commands.submit_and_wait()?);
-                totals.add_counters(bytemuck::cast_slice(&self.buffers[binding::COUNTERS as usize].read()?[..40]))?;
+                totals.add_counters(bytemuck::cast_slice(&self.read_back.read()?[..COUNTER_BYTES]))?;
                 if let Some(progress) = &options.progress {
                     let done = first_pixel * u64::from(samples) + u64::from(pixels) * u64::from(first_sample + count);
                     progress(done, padded_pixels * u64::from(samples));
@@ -160,8 +176,8 @@ impl<'a> Frame<'a> {
 
     /// Copies a band from tile order to the rows of the film.
     fn collect(&self, film: &mut Film, first_pixel: u64, pixels: u32) -> Result<()> {
-        let bytes = self.buffers[binding::FILM as usize].read()?;
-        let band: &[[f32; 4]] = bytemuck::cast_slice(&bytes[..pixels as usize * size_of::<[f32; 4]>()]);
+        let bytes = &self.read_back.read()?[COUNTER_BYTES..][..pixels as usize * PIXEL_BYTES];
+        let band: &[[f32; 4]] = bytemuck::cast_slice(bytes);
         let (side, across) = (TILE as usize, self.view.width.div_ceil(TILE) as usize);
         let (width, height) = (self.view.width as usize, self.view.height as usize);
         // Bands are whole tiles.

@@ -155,7 +155,7 @@ impl Plan {
         buffer("hit_queue", queue(true, size_of::<HitItem>()), true);
         buffer("shadow_queue", queue(features.shadows, size_of::<ShadowItem>()), true);
         buffer("reflection_queue", queue(features.reflections, size_of::<ReflectionItem>()), true);
-        buffer("counters", 4 * u64::from(crate::layout::COUNTERS), false);
+        buffer("counters", (4 * u64::from(crate::layout::COUNTERS)).next_multiple_of(PIXEL), false);
         buffer("dispatches", 12 * u64::from(crate::layout::QUEUES), false);
         buffer("radiance", in_flight * PIXEL, false);
         buffer("film", u64::from(self.band_pixels) * PIXEL, false);

@@ -152,10 +152,6 @@ fn material(material: &scene::Material) -> layout::Material {
 
 /// Makes the buffer of a slot that only the frame itself writes.
 pub(super) fn frame_buffer(renderer: &Renderer, slot: u32, name: &'static str, bytes: u64) -> Result<Buffer> {
-    let (usage, memory) = match slot {
-        binding::COUNTERS | binding::FILM => (Usage::Storage, Memory::ReadBack),
-        binding::DISPATCHES => (Usage::Indirect, Memory::Device),
-        _ => (Usage::Storage, Memory::Device),
-    };
-    Buffer::new(&renderer.device, name, bytes, usage, memory)
+    let usage = if slot == binding::DISPATCHES { Usage::Indirect } else { Usage::Storage };
+    Buffer::new(&renderer.device, name, bytes, usage, Memory::Device)
 }

@@ -117,6 +117,8 @@ impl Bindings {
         // SAFETY: the pool has room for one set of this layout and is used by this thread alone.
         let sets = unsafe { device.raw.allocate_descriptor_sets(&info) }.map_err(failed("allocate descriptor set"))?;
         bindings.set = sets[0];
+        device.set_name(bindings.pool, "bindings");
+        device.set_name(bindings.set, "bindings");
         bindings.write(buffer_of);
         Ok(bindings)
     }

@@ -1,7 +1,7 @@
 //! Buffers: memory, optional texel view, upload and read-back.
 
 use super::device::lock;
-use super::{failed, Commands, Device, Fetch};
+use super::{failed, Access, Commands, Device, Fetch};
 use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
@@ -102,7 +102,9 @@ impl Buffer {
         staging.write(data)?;
         let buffer = Self::new(device, name, bytes, usage, Memory::Device)?;
         let mut commands = Commands::new(device, 0)?;
-        commands.copy(&staging, &buffer, bytes.min(staging.bytes));
+        commands.copy(&staging, &buffer, 0, bytes);
+        // Buffer: the copy wrote, kernels of later submissions read.
+        commands.barrier(Access::Transfer, Access::ShaderReadWrite);
         commands.submit_and_wait()?;
         Ok(buffer)
     }

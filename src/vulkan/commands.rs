@@ -35,7 +35,9 @@ impl Access {
     fn flags(self) -> vk::AccessFlags {
         match self {
             Access::ShaderWrite => vk::AccessFlags::SHADER_WRITE,
-            Access::ShaderReadWrite => vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE,
+            Access::ShaderReadWrite => {
+                vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::UNIFORM_READ
+            }
             Access::ShaderAndIndirect => {
                 vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::INDIRECT_COMMAND_READ
             }
@@ -82,9 +84,12 @@ impl Commands {
         // SAFETY: the pool was just made and is used by this thread alone.
         let buffers = unsafe { raw.allocate_command_buffers(&info) }.map_err(failed("allocate commands"))?;
         commands.buffer = buffers[0];
+        device.set_name(commands.pool, "commands");
+        device.set_name(commands.buffer, "commands");
         // SAFETY: a valid description.
         commands.fence =
             unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }.map_err(failed("create fence"))?;
+        device.set_name(commands.fence, "commands done");
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the command buffer is fresh.
         unsafe { raw.begin_command_buffer(commands.buffer, &begin) }.map_err(failed("begin commands"))?;
@@ -177,10 +182,10 @@ impl Commands {
         unsafe { self.device.raw.cmd_fill_buffer(self.buffer, buffer.raw, 0, vk::WHOLE_SIZE, 0) };
     }
 
-    /// Copies the first `bytes`.
-    pub fn copy(&mut self, from: &Buffer, to: &Buffer, bytes: u64) {
-        let region = [vk::BufferCopy::default().size(bytes)];
-        // SAFETY: recording; both buffers are alive, have transfer usage and at least this size.
+    /// Copies the first `bytes` to `offset`.
+    pub fn copy(&mut self, from: &Buffer, to: &Buffer, offset: u64, bytes: u64) {
+        let region = [vk::BufferCopy::default().dst_offset(offset).size(bytes)];
+        // SAFETY: recording; both buffers are alive, have transfer usage and room for the bytes.
         unsafe { self.device.raw.cmd_copy_buffer(self.buffer, from.raw, to.raw, &region) };
     }
 

@@ -159,7 +159,7 @@ impl Device {
         // SAFETY: the physical device belongs to the instance.
         let properties = unsafe { instance.raw.get_physical_device_properties(physical) };
         let suitable = if info.max_texels >= ENOUGH_TEXELS { Fetch::Texel } else { Fetch::Storage };
-        Ok(Arc::new(Self {
+        let device = Arc::new(Self {
             raw,
             queue: Mutex::new(queue),
             queue_family,
@@ -170,7 +170,10 @@ impl Device {
             info,
             fetch: fetch.unwrap_or(suitable),
             instance: instance.clone(),
-        }))
+        });
+        device.set_name(device.raw.handle(), "glimt");
+        device.set_name(queue, "compute");
+        Ok(device)
     }
 
     /// Most bytes of device memory that buffers have held at once.

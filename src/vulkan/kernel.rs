@@ -26,6 +26,7 @@ impl Kernel {
         // SAFETY: build.rs compiled the code for Vulkan 1.2.
         let module =
             unsafe { device.raw.create_shader_module(&info, None) }.map_err(failed(format!("load kernel {name}")))?;
+        device.set_name(module, name);
         let values: Vec<u8> = constants.iter().flat_map(|on| u32::from(*on).to_ne_bytes()).collect();
         let entries: Vec<_> = (0..constants.len() as u32)
             .map(|id| vk::SpecializationMapEntry::default().constant_id(id).offset(4 * id).size(4))
