@@ -19,8 +19,8 @@ uint interleaved_workgroup() {
 Ray camera_ray(vec2 point) {
     vec2 plane = vec2(point.x / float(frame.width) * 2.0 - 1.0, 1.0 - point.y / float(frame.height) * 2.0);
     vec3 offset = frame.right * plane.x + frame.up * plane.y;
-    return frame.orthographic != 0u ? Ray(frame.eye + offset, frame.forward, NO_TRIANGLE)
-                                    : Ray(frame.eye, normalize(frame.forward + offset), NO_TRIANGLE);
+    return frame.orthographic != 0u ? Ray(frame.eye + offset, frame.forward)
+                                    : Ray(frame.eye, normalize(frame.forward + offset));
 }
 
 /// One thread a pixel sample: camera ray → nearest hit → hit queue, or background.

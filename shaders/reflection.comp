@@ -11,7 +11,7 @@ void main() {
     if (index >= queue_items(QUEUE_REFLECTION))
         return;
     ReflectionItem item = reflection_queue[index];
-    Hit hit = nearest_hit(Ray(item.origin, item.direction, item.origin_primitive));
+    Hit hit = nearest_hit(Ray(item.origin, item.direction));
     if (hit.triangle == NO_TRIANGLE) {
         add_radiance(item.sample_index, item.throughput * background(item.direction));
         return;

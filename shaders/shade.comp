@@ -21,7 +21,7 @@ void queue_shadow_ray(HitItem item, Surface surface, Material material, Light li
         return;
     vec3 origin = leave_surface(surface, light_sample.direction);
     shadow_queue[queue_append(QUEUE_SHADOW)] =
-        ShadowItem(item.sample_index, origin, surface.primitive, light_sample.direction, light_sample.distance, added);
+        ShadowItem(item.sample_index, origin, light_sample.direction, light_sample.distance, added);
 }
 
 /// The mirror's part: r = 2(n·v)n − v, with v against the ray.
@@ -31,7 +31,7 @@ void queue_reflection_ray(HitItem item, Surface surface, Material material) {
         return;
     vec3 direction = normalize(reflect(item.direction, surface.normal));
     reflection_queue[queue_append(QUEUE_REFLECTION)] =
-        ReflectionItem(item.sample_index, leave_surface(surface, direction), surface.primitive, direction, throughput);
+        ReflectionItem(item.sample_index, leave_surface(surface, direction), direction, throughput);
 }
 
 /// One thread a hit: ambient and emission at once; a light → shadow queue; the mirror → reflection queue. With several

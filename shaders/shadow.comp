@@ -10,6 +10,6 @@ void main() {
     if (index >= queue_items(QUEUE_SHADOW))
         return;
     ShadowItem item = shadow_queue[index];
-    if (!any_hit(Ray(item.origin, item.direction, item.origin_primitive), item.distance))
+    if (!any_hit(Ray(item.origin, item.direction), item.distance))
         add_radiance(item.sample_index, item.radiance);
 }

@@ -8,8 +8,6 @@ const uint NO_TRIANGLE = 0xffffffffu;
 struct Ray {
     vec3 origin;
     vec3 direction;
-    /// The flat primitive that the ray leaves and so cannot hit; NO_TRIANGLE for a ray from nowhere.
-    uint origin_primitive;
 };
 
 struct Hit {
@@ -29,7 +27,6 @@ struct ShearedRay {
     /// x/z, y/z and 1/z of the rotated direction.
     vec3 shear;
     uint largest_axis;
-    uint origin_primitive;
 };
 
 vec3 rotate_axes(vec3 v, uint largest_axis) {
@@ -40,7 +37,7 @@ ShearedRay shear_ray(Ray ray) {
     vec3 size = abs(ray.direction);
     uint axis = size.x >= size.y ? (size.x >= size.z ? 0u : 2u) : (size.y >= size.z ? 1u : 2u);
     vec3 d = rotate_axes(ray.direction, axis);
-    return ShearedRay(ray.origin, vec3(d.x / d.z, d.y / d.z, 1.0 / d.z), axis, ray.origin_primitive);
+    return ShearedRay(ray.origin, vec3(d.x / d.z, d.y / d.z, 1.0 / d.z), axis);
 }
 
 /// Takes the triangle as the new hit if it is nearer than the old one.
@@ -66,8 +63,7 @@ bool intersect_triangle(ShearedRay ray, uint triangle, bool culls, inout Hit hit
     // det and 1/z have the same sign when the ray meets the front face.
     bool culled = culls && (texel_c.w & TRIANGLE_SINGLE_SIDED) != 0u && (det < 0.0) != (ray.shear.z < 0.0);
     bool nearer = t < hit.t || (t == hit.t && texel_a.w < hit.primitive);
-    bool is_origin = texel_a.w == ray.origin_primitive;
-    if (inside && det != 0.0 && t > 0.0 && nearer && !culled && !is_origin) {
+    if (inside && det != 0.0 && t > 0.0 && nearer && !culled) {
         hit = Hit(t, triangle, texel_a.w, vec2(v, w) / det);
         return true;
     }

@@ -167,8 +167,6 @@ struct ShadowItem {
     uint sample_index;
     /// Start, off the surface.
     vec3 origin;
-    /// Primitive that the ray leaves: it cannot be hit.
-    uint origin_primitive;
     /// Unit direction to the light.
     vec3 direction;
     /// Distance to the light.
@@ -183,8 +181,6 @@ struct ReflectionItem {
     uint sample_index;
     /// Start, off the surface.
     vec3 origin;
-    /// Primitive that the ray leaves: it cannot be hit.
-    uint origin_primitive;
     /// Unit direction.
     vec3 direction;
     /// Product of the mirror coefficients on the way here.

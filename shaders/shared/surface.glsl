@@ -11,7 +11,6 @@ struct Surface {
     /// Vertex colour.
     vec3 tint;
     uint material;
-    uint primitive;
 };
 
 vec3 interpolate(vec3 weights, uvec4 a, uvec4 b, uvec4 c) {
@@ -56,12 +55,11 @@ Surface surface_at(HitItem item) {
         surface.tint = interpolate(weights, FETCH(colors, attributes), FETCH(colors, attributes + 1u),
                                    FETCH(colors, attributes + 2u));
     surface.material = texel_b.w;
-    surface.primitive = texel_a.w;
     return surface;
 }
 
 /// Start of a ray that leaves the surface: moved along the geometric normal, to the side the ray goes to, by the error
-/// bound. The triangle itself is excluded by its number; this clears its neighbours.
+/// bound, which grows with the triangle and its distance from the world's origin.
 vec3 leave_surface(Surface surface, vec3 direction) {
     float side = dot(surface.geometric_normal, direction) < 0.0 ? -1.0 : 1.0;
     return surface.position + surface.geometric_normal * (side * surface.error);
