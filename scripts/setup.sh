@@ -1,4 +1,5 @@
-# Sourced by render.sh and test.sh: installs what is missing on Debian and Ubuntu, and sets `cargo_config`.
+# Sourced by render.sh and test.sh: installs what is missing on Debian and Ubuntu (`more_packages` too), and sets
+# `cargo_config`.
 # Says nothing when nothing is to be done; what it says goes to standard error.
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -26,7 +27,7 @@ install() {
 # A GPU brings its own driver; Mesa's software Vulkan stands in where there is none.
 packages=(libvulkan1 mesa-vulkan-drivers g++ libshaderc-dev)
 if command -v apt-get >/dev/null && command -v dpkg-query >/dev/null; then
-    install "${packages[@]}" "$@"
+    install "${packages[@]}" ${more_packages[@]+"${more_packages[@]}"}
 else
     echo "this is neither Debian nor Ubuntu: a Vulkan loader and driver and a C++ compiler must be there already" >&2
 fi

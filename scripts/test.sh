@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs what is missing, the validation layers too, and runs every check: format, lints, documentation, all tests.
 set -euo pipefail
-source "$(dirname "${BASH_SOURCE[0]}")/setup.sh" vulkan-validationlayers
+more_packages=(vulkan-validationlayers)
+source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 cd "$root"
 step() { echo "== $*" >&2; }
 
