@@ -79,7 +79,7 @@ impl RenderArgs {
         report.image.sha256 = saved.sha256;
         if self.json {
             outcome.stdout = Outcome::json(&report)?.stdout;
-        } else if !target.is_stdout {
+        } else if !target.is_stdout && !self.quiet {
             outcome.stdout = format!("{}\n", target.path.display()).into_bytes();
         }
         if !self.quiet && !self.json {
