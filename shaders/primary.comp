@@ -33,7 +33,7 @@ void main() {
     if (place.x >= frame.width || place.y >= frame.height)
         return;
     vec2 inside = vec2(0.5);
-    if (MULTISAMPLING)
+    if (MULTISAMPLING && frame.samples > 1u)
         inside = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_index % step_now.samples);
 
     Ray ray = camera_ray(vec2(place) + inside);

@@ -1,7 +1,5 @@
 //! The `glimt` program: parse → call the library → print → exit code. The only place that prints and exits.
 
-#![allow(clippy::print_stderr)]
-
 mod cli;
 
 use clap::Parser;
@@ -12,43 +10,50 @@ use std::sync::Arc;
 
 fn main() -> ExitCode {
     let context = cli::Context { started: std::time::Instant::now(), interrupted: Arc::new(AtomicBool::new(false)) };
-    let interrupted = context.interrupted.clone();
-    // The first Ctrl-C lets work stop in order, removing temporary files; the second ends the process.
-    let handler = ctrlc::set_handler(move || {
-        if interrupted.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
-    if let Err(error) = handler {
-        eprintln!("glimt: warning: Ctrl-C will not clean up: {error}");
-    }
     let command = match cli::Cli::try_parse() {
         Ok(command) => command,
         Err(answer) if !answer.use_stderr() => answer.exit(),
         Err(error) => {
-            eprintln!("glimt: {}", one_line(&error));
+            say(&format!("glimt: {}\n", one_line(&error)));
             return ExitCode::from(2);
         }
     };
+    let interrupted = context.interrupted.clone();
+    let writes_files = command.writes_files();
+    // Where a file may be half written the first Ctrl-C lets the work stop in order; otherwise, and the second time, the
+    // process ends at once.
+    let handler = ctrlc::set_handler(move || {
+        if interrupted.swap(true, Ordering::Relaxed) || !writes_files {
+            std::process::exit(130);
+        }
+    });
+    if let Err(error) = handler {
+        say(&format!("glimt: warning: Ctrl-C will not clean up: {error}\n"));
+    }
     match command.run(&context) {
         Ok(outcome) => {
-            eprint!("{}", outcome.stderr);
             let mut stdout = std::io::stdout().lock();
-            match stdout.write_all(&outcome.stdout).and_then(|()| stdout.flush()) {
-                Ok(()) => ExitCode::from(outcome.code),
+            let written = stdout.write_all(&outcome.stdout).and_then(|()| stdout.flush());
+            say(&outcome.stderr);
+            match written {
                 // A reader that closes the pipe has what it wants.
-                Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => ExitCode::from(outcome.code),
-                Err(error) => {
-                    eprintln!("glimt: cannot write standard output: {error}");
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                    say(&format!("glimt: cannot write standard output: {error}\n"));
                     ExitCode::from(4)
                 }
+                _ => ExitCode::from(outcome.code),
             }
         }
         Err(error) => {
-            eprintln!("glimt: {error}");
+            say(&format!("glimt: {error}\n"));
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Writes to standard error; nobody can be told when that fails.
+fn say(text: &str) {
+    let _ = std::io::stderr().write_all(text.as_bytes());
 }
 
 /// What is wrong with the command line and the tip, if there is one, without the usage.

@@ -163,6 +163,30 @@ fn a_picture_its_report_and_its_formats() {
 }
 
 #[test]
+fn standard_error_may_be_full_and_folders_may_bear_a_scene_s_name() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("table")).unwrap();
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = glimt(folder.path(), &tiny(&["-o", "-"])).stderr(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stdout.starts_with(b"\x89PNG"), "the picture goes to standard output all the same");
+    let output =
+        glimt(folder.path(), &tiny(&["-o", "-"])).stdout(std::fs::File::create("/dev/full").unwrap()).output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
+}
+
+#[cfg(unix)]
+#[test]
+fn the_picture_behind_a_link_is_replaced_not_the_link() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("real.png"), b"old").unwrap();
+    std::os::unix::fs::symlink("real.png", folder.path().join("link.png")).unwrap();
+    assert!(run(folder.path(), &tiny(&["-o", "link.png"])).status.success());
+    assert!(folder.path().join("link.png").is_symlink());
+    assert!(std::fs::read(folder.path().join("real.png")).unwrap().starts_with(b"\x89PNG"));
+}
+
+#[test]
 fn a_scene_from_standard_input() {
     let folder = tempfile::tempdir().unwrap();
     let document = br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{}]}"#;
@@ -258,7 +282,7 @@ fn ctrl_c_leaves_nothing_half_written() {
     let mut child =
         glimt(folder.path(), &["render", "--size", "2048x2048", "--spp", "256"]).stderr(Stdio::null()).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_millis(1500));
-    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert!(files(folder.path()).is_empty(), "{:?}", files(folder.path()));
 }

@@ -3,7 +3,7 @@
 use super::support::{assert_alike, draw, draw_reference, renderer, storage_renderer};
 use glam::{DMat4, DVec3, Vec3};
 use glimt::scene::{
-    built_in, shapes, Background, CameraChoice, Instance, Light, LightKind, Material, Mesh, Whitted, BUILT_IN,
+    built_in, shapes, Background, CameraChoice, Instance, Light, LightKind, Material, Mesh, Soup, Whitted, BUILT_IN,
 };
 use glimt::{Error, Options, Scene};
 
@@ -96,7 +96,7 @@ fn every_light_material_and_camera_agrees_with_the_reference() {
         );
     }
     let mut orthographic = scene.clone();
-    let view = small().view(&Scene { cameras: Vec::new(), ..scene }).unwrap();
+    let view = small().view(&scene, &Soup::of(&scene).unwrap()).unwrap();
     let projection = glimt::scene::Projection::Orthographic { half_height: 1.5 };
     orthographic.cameras = vec![("flat".into(), glimt::scene::Camera { projection, ..view.camera })];
     assert_alike("everything/orthographic", &draw_reference(&orthographic, &small()), &draw(&orthographic, &small()).0);
@@ -104,12 +104,16 @@ fn every_light_material_and_camera_agrees_with_the_reference() {
 
 #[test]
 fn bands_fetching_and_unneeded_features_change_no_pixel() {
-    let scenes = [everything(), built_in("teapot").unwrap(), built_in("cornell").unwrap()];
+    let dark = Scene { lights: Vec::new(), ..everything() };
+    let scenes = [everything(), dark, built_in("teapot").unwrap(), built_in("cornell").unwrap()];
     for scene in scenes {
-        let options = Options { size: (203, 97), samples: 6, ..Options::default() };
+        let once = Options { size: (203, 97), ..Options::default() };
+        let forced = Options { all_features: true, ..once.clone() };
+        assert_eq!(draw(&scene, &once).0, draw(&scene, &forced).0, "{}: all features, one sample", scene.name);
+        let options = Options { samples: 6, ..once };
         let film = draw(&scene, &options).0;
         assert_eq!(film, draw(&scene, &options).0, "{}: twice", scene.name);
-        for samples_in_flight in [64, 1000, 1 << 21] {
+        for samples_in_flight in [64, 1000, u32::MAX] {
             assert_eq!(
                 film,
                 draw(&scene, &Options { samples_in_flight, ..options.clone() }).0,

@@ -320,5 +320,54 @@ fn hostile_bytes_are_refused_without_panic() {
     }
     // A count that nothing backs allocates nothing.
     let huge = json!({"accessors": [{"componentType": 5126, "type": "VEC3", "count": 4_000_000_000_u64}]});
-    assert!(message(triangle(huge)).contains("no data for so many"));
+    assert!(message(triangle(huge)).contains("more data than 2 GiB"));
+}
+
+#[test]
+fn small_files_cannot_ask_for_much() {
+    // Found by review: each of these took gigabytes.
+    let mut builder = Builder::default();
+    let positions = builder.floats("VEC3", &TRIANGLE);
+    let places = builder.accessor(json!({"componentType": 5126, "type": "VEC3", "count": 1_u64 << 26}));
+    let instancing = json!({"extensionsUsed": ["EXT_mesh_gpu_instancing"],
+        "nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}}}]});
+    let primitive = json!({"attributes": {"POSITION": positions}});
+    assert!(message(read(&builder.document(primitive, instancing))).contains("no data for so many"));
+
+    let mut builder = Builder::default();
+    let unbacked = builder.accessor(json!({"componentType": 5126, "type": "VEC3", "count": 1 << 20}));
+    let primitives = vec![json!({"attributes": {"POSITION": unbacked}}); 1000];
+    let many = json!({"meshes": [{"primitives": primitives}]});
+    assert!(message(read(&builder.document(json!({}), many))).contains("more data than 2 GiB"));
+
+    let places = json!(vec![json!({"mesh": 0}); 3000]);
+    let all: Vec<usize> = (0..3000).collect();
+    let mut builder = Builder::default();
+    let positions = builder.floats("VEC3", &TRIANGLE);
+    let primitives = vec![json!({"attributes": {"POSITION": positions}}); 2000];
+    let many = json!({"meshes": [{"primitives": primitives}], "nodes": places, "scenes": [{"nodes": all}]});
+    assert!(message(read(&builder.document(json!({}), many))).contains("instances of meshes"));
+}
+
+#[test]
+fn buffers_lie_beside_the_document() {
+    let folder = tempfile::tempdir().unwrap();
+    for uri in ["../../../../dev/zero", "/dev/zero", "a/../../b.bin", ".", "missing.bin"] {
+        let mut builder = Builder::default();
+        let positions = builder.floats("VEC3", &TRIANGLE);
+        let more = json!({"buffers": [{"byteLength": 36, "uri": uri}]});
+        let document = builder.document(json!({"attributes": {"POSITION": positions}}), more).to_string();
+        let result = gltf::parse(document.as_bytes(), "test".into(), "test.gltf", Some(folder.path()), None);
+        assert!(message(result).contains("buffers[0]"), "{uri}");
+    }
+}
+
+#[test]
+fn unlit_is_the_base_color_alone() {
+    let mut builder = Builder::default();
+    let positions = builder.floats("VEC3", &TRIANGLE);
+    let more = json!({"extensionsUsed": ["KHR_materials_unlit"],
+        "materials": [{"emissiveFactor": [0, 1, 0], "extensions": {"KHR_materials_unlit": {}}}]});
+    let scene = read(&builder.document(json!({"attributes": {"POSITION": positions}, "material": 0}), more)).unwrap();
+    assert!(scene.materials[0].unlit && scene.materials[0].emission == DVec3::ZERO);
 }

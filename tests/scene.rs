@@ -103,9 +103,10 @@ fn flattened_and_broken_instances_are_dropped_with_a_warning() {
 #[test]
 fn the_orbit_convention() {
     let scene = built_in("table").unwrap();
+    let soup = Soup::of(&scene).unwrap();
     let at = |theta, phi, radius| {
         let choice = CameraChoice::Orbit { theta, phi, radius, target: Some(DVec3::ONE) };
-        scene.camera(&choice, DVec3::Y, None, 1.0).unwrap()
+        scene.camera(&soup, &choice, DVec3::Y, None, 1.0).unwrap()
     };
     let near = |a: DVec3, b: DVec3| a.distance(b) < 1e-12;
     assert!(near(at(0.0, 90.0, 2.0).eye, DVec3::new(1.0, 1.0, 3.0)), "theta 0: +z");
@@ -117,7 +118,7 @@ fn the_orbit_convention() {
         "radius 0 looks outward from the target"
     );
     let parallel = CameraChoice::LookAt { eye: DVec3::Y, target: Some(DVec3::ZERO) };
-    assert!(scene.camera(&parallel, DVec3::Y, None, 1.0).is_err(), "view parallel to up");
+    assert!(scene.camera(&soup, &parallel, DVec3::Y, None, 1.0).is_err(), "view parallel to up");
 }
 
 #[test]
@@ -135,6 +136,27 @@ fn a_scene_without_a_camera_is_framed() {
             .flat_map(|x| [(x, 0), (x, height - 1)])
             .chain((0..height).flat_map(|y| [(0, y), (width - 1, y)]));
         assert!(border.into_iter().all(|(x, y)| !covered(x, y)), "{size:?}: all of it");
+    }
+}
+
+#[test]
+fn framing_heeds_what_is_drawn_and_what_is_up() {
+    let mut stray = shapes::cube();
+    stray.positions.push(Vec3::X * 1e5);
+    let transparent = Options { size: (32, 32), background: "transparent".parse().unwrap(), ..Options::default() };
+    let (film, _) = super::support::draw(&one_mesh(stray, DMat4::IDENTITY), &transparent);
+    assert_eq!(film.pixels[16 * 32 + 16][3], 1.0, "a vertex that no triangle uses moved the camera away");
+    let flat = one_mesh(shapes::cube(), DMat4::from_scale(DVec3::new(1.0, 3.0, 1.0)));
+    let upright = super::support::draw(&flat, &transparent).0;
+    let lying = super::support::draw(&flat, &Options { up: DVec3::X, ..transparent }).0;
+    assert_ne!(upright, lying, "--up turns the camera that frames a scene");
+}
+
+#[test]
+fn scenes_beyond_f32_are_refused() {
+    for scale in [1e-14, 1e14] {
+        let error = Soup::of(&one_mesh(shapes::cube(), DMat4::from_scale(DVec3::splat(scale)))).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains("can be computed"), "{error}");
     }
 }
 

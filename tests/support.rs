@@ -1,7 +1,7 @@
 //! What several tests need.
 
 use glimt::render::Renderer;
-use glimt::vulkan::{DeviceChoice, Fetch};
+use glimt::vulkan::{DeviceChoice, Fetch, Habits};
 use glimt::{film, reference, render, Film, Options, Report, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -17,11 +17,11 @@ pub fn renderer() -> &'static Renderer {
     })
 }
 
-/// The same device, fetching from storage buffers.
+/// The same device, fetching from storage buffers and uploading through staging buffers, as others do.
 pub fn storage_renderer() -> &'static Renderer {
     static RENDERER: OnceLock<Renderer> = OnceLock::new();
-    RENDERER
-        .get_or_init(|| Renderer::with_fetch(&DeviceChoice::Best, true, Some(Fetch::Storage)).expect("a Vulkan device"))
+    let habits = Habits { fetch: Some(Fetch::Storage), staged: Some(true) };
+    RENDERER.get_or_init(|| Renderer::with_habits(&DeviceChoice::Best, true, habits).expect("a Vulkan device"))
 }
 
 /// Renders on the device; any validation message fails.

@@ -1,10 +1,11 @@
 //! `glimt diff`.
 
-use super::Outcome;
+use super::{Context, Outcome};
 use clap::{Args, ValueHint};
 use glimt::film::{self, Format, Metrics};
-use glimt::Result;
+use glimt::{Error, Result};
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 
 /// Flags of `glimt diff`.
 #[derive(Args)]
@@ -43,12 +44,17 @@ pub struct DiffArgs {
 
 impl DiffArgs {
     /// Compares; exit code 1 when a threshold fails.
-    pub fn run(self) -> Result<Outcome> {
+    pub fn run(self, context: &Context) -> Result<Outcome> {
         let format = self.output.as_ref().map(|path| Format::of(path, 8)).transpose()?;
         let (reference, picture) = (film::read(&self.reference)?, film::read(&self.picture)?);
         let metrics = film::compare(&reference, &picture)?;
         if let (Some(path), Some(format)) = (&self.output, format) {
-            film::heat_map(&reference, &picture)?.save(path, format, || Ok(()))?;
+            film::heat_map(&reference, &picture)?.save(path, format, || {
+                match context.interrupted.load(Ordering::Relaxed) {
+                    true => Err(Error::Interrupted),
+                    false => Ok(()),
+                }
+            })?;
         }
         let failed = self.failed(&metrics);
         let mut outcome = if self.json { Outcome::json(&metrics)? } else { Outcome::text(text(&metrics)) };

@@ -33,6 +33,8 @@ struct Info {
     bounds: Option<[[f64; 3]; 2]>,
     materials: Vec<String>,
     lights: Vec<String>,
+    #[serde(skip)]
+    without_lights: &'static str,
     cameras: Vec<String>,
     warnings: Vec<String>,
 }
@@ -85,9 +87,13 @@ impl Info {
             triangles: soup.len(),
             unique_triangles: scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum(),
             vertices: scene.meshes.iter().map(|mesh| mesh.positions.len()).sum(),
-            bounds: scene.bounds().map(|(lo, hi)| [lo.to_array(), hi.to_array()]),
+            bounds: soup.bounds().map(|(lo, hi)| [lo.to_array(), hi.to_array()]),
             materials: scene.materials.iter().map(material).collect(),
             lights: scene.lights.iter().map(light).collect(),
+            without_lights: match scene.has_lights {
+                true => "none that a node of this scene places",
+                false => "none: a default light is used",
+            },
             cameras: scene.cameras.iter().map(camera).collect(),
             warnings: scene.warnings.iter().chain(&soup.warnings).cloned().collect(),
         })
@@ -103,7 +109,7 @@ impl Info {
         }
         let lists = [
             ("cameras", &self.cameras, "none: one that frames the scene is used"),
-            ("lights", &self.lights, "none: a default light is used"),
+            ("lights", &self.lights, self.without_lights),
             ("materials", &self.materials, "none"),
             ("approximated, ignored or dropped", &self.warnings, "nothing: all of the file is used"),
         ];

@@ -58,7 +58,8 @@ Examples:
   glimt explain model.glb                           what is computed, what is left out, and why
   glimt diff a.png b.png --max-rmse 0.004           exit code 1 when they differ more
 
-Exit codes: 0 done · 1 a check said no · 2 bad usage or input · 3 no usable device, or it failed · 4 output not written";
+Exit codes: 0 done · 1 a check said no · 2 bad usage or input · 3 no usable device, or it failed · 4 output not written ·
+130 interrupted";
 
 /// Headless Vulkan ray tracer for glTF scenes: the same picture on every device, GPU or none.
 #[derive(Parser)]
@@ -85,6 +86,11 @@ enum Command {
 }
 
 impl Cli {
+    /// The command writes a file, so that Ctrl-C must let it clean up.
+    pub fn writes_files(&self) -> bool {
+        matches!(self.command, Command::Render(_) | Command::Diff(_))
+    }
+
     /// Runs the command.
     ///
     /// # Errors
@@ -95,7 +101,7 @@ impl Cli {
             Command::Info(args) => args.run(),
             Command::Explain(args) => args.run(),
             Command::Devices(args) => args.run(),
-            Command::Diff(args) => args.run(),
+            Command::Diff(args) => args.run(context),
             Command::Completions(args) => args.run(),
         }
     }
@@ -104,7 +110,7 @@ impl Cli {
 /// A scene by the name of a built-in one, by path, or `-` for standard input. A file wins over a built-in of its name.
 fn load_scene(name: &str, scene_choice: Option<&str>) -> Result<Scene> {
     let is_built_in = scene::BUILT_IN.iter().any(|(own, _)| *own == name);
-    if is_built_in && !Path::new(name).exists() {
+    if is_built_in && (Path::new(name).is_dir() || !Path::new(name).exists()) {
         if let Some(choice) = scene_choice {
             return Err(Error::Usage(format!("the built-in scene '{name}' has no scene '{choice}' in it")));
         }

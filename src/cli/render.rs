@@ -5,6 +5,7 @@ use super::{load_scene, progress, Context, Outcome};
 use clap::{Args, ValueHint};
 use glimt::film::{Film, Format, Saved};
 use glimt::render::{build_tree, describe, Prepared, Renderer};
+use glimt::scene::Background;
 use glimt::vulkan::DeviceChoice;
 use glimt::{reference, report, Error, Options, Report, Result, Scene};
 use std::path::{Path, PathBuf};
@@ -58,6 +59,9 @@ impl RenderArgs {
         options.interrupted = context.interrupted.clone();
         options.progress = if self.quiet { None } else { progress::bar() };
         let target = Target::of(&self)?;
+        if target.format == Format::Hdr && options.background == Background::Transparent {
+            return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
+        }
         self.set_threads()?;
 
         let (film, mut report) = match self.device.as_deref() {
@@ -69,10 +73,7 @@ impl RenderArgs {
         };
         let start = Instant::now();
         let mut outcome = Outcome::default();
-        let saved = target.save(&film, &mut outcome.stdout, || match context.interrupted.load(Ordering::Relaxed) {
-            true => Err(Error::Interrupted),
-            false => Ok(()),
-        })?;
+        let saved = target.save(&film, &mut outcome.stdout, || stop_if_interrupted(&options))?;
         report.times_ms.save = milliseconds(start);
         report.times_ms.total = milliseconds(context.started);
         report.image.path = target.path.display().to_string();
@@ -98,6 +99,7 @@ impl RenderArgs {
             let start = Instant::now();
             let (bvh, center) = build_tree(&prepared.soup);
             let bvh_ms = milliseconds(start);
+            stop_if_interrupted(options)?;
             let renderer = device.join().map_err(|_| Error::Device("opening it failed".into()))??;
             let (film, mut report) = renderer.render_with_tree(&scene, &prepared, options, &bvh, center)?;
             (report.times_ms.load, report.times_ms.bvh) = (load, bvh_ms);
@@ -124,6 +126,7 @@ impl RenderArgs {
 
     fn load(&self, options: &Options) -> Result<(Scene, Prepared)> {
         let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
+        stop_if_interrupted(options)?;
         let prepared = Prepared::new(&scene, options)?;
         Ok((scene, prepared))
     }
@@ -134,7 +137,7 @@ impl RenderArgs {
         if !(1..=1024).contains(&threads) {
             return Err(refuse("must be 1 to 1024".into()));
         }
-        // Mesa's software Vulkan reads this when the device is opened; no other thread runs yet.
+        // Mesa's software Vulkan reads this when the device is opened; until then only Ctrl-C has a thread, which waits.
         std::env::set_var("LP_NUM_THREADS", threads.to_string());
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|error| refuse(error.to_string()))
     }
@@ -160,7 +163,9 @@ impl Target {
         }
         let path = args.output.clone().unwrap_or_else(|| {
             let name = if args.scene == "-" { "stdin".as_ref() } else { Path::new(&args.scene) };
-            PathBuf::from(name.file_stem().unwrap_or("picture".as_ref())).with_extension("png")
+            let mut file = name.file_stem().unwrap_or("picture".as_ref()).to_owned();
+            file.push(".png");
+            PathBuf::from(file)
         });
         let format = Format::of(&path, args.bits)?;
         glimt::film::check_writable(&path)?;
@@ -172,6 +177,13 @@ impl Target {
             return film.encode(stdout, self.format, &self.path);
         }
         film.save(&self.path, self.format, may_finish)
+    }
+}
+
+fn stop_if_interrupted(options: &Options) -> Result<()> {
+    match options.interrupted.load(Ordering::Relaxed) {
+        true => Err(Error::Interrupted),
+        false => Ok(()),
     }
 }
 
@@ -199,6 +211,7 @@ mod tests {
     fn the_picture_is_named_after_the_scene() {
         assert_eq!(target("").unwrap().path, Path::new("table.png"));
         assert_eq!(target("some/where/model.glb").unwrap().path, Path::new("model.png"));
+        assert_eq!(target("chair.v2.glb").unwrap().path, Path::new("chair.v2.png"));
         assert_eq!(target("-").unwrap().path, Path::new("stdin.png"));
     }
 

@@ -78,13 +78,15 @@ impl Film {
     /// # Errors
     /// `Write` when that fails; `Usage` when the format cannot hold the picture; whatever `may_finish` answers.
     pub fn save(&self, path: &Path, format: Format, may_finish: impl FnOnce() -> Result<()>) -> Result<Saved> {
-        let mut file = temporary(path)?;
+        // Behind a symbolic link the picture it names is replaced, not the link.
+        let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let mut file = temporary(&target)?;
         let mut writer = BufWriter::new(file.as_file_mut());
         let saved = self.encode(&mut writer, format, path)?;
         writer.flush().map_err(|error| Error::write(path, error))?;
         drop(writer);
         may_finish()?;
-        file.persist(path).map_err(|error| Error::write(path, error.error))?;
+        file.persist(&target).map_err(|error| Error::write(path, error.error))?;
         Ok(saved)
     }
 

@@ -50,7 +50,7 @@ pub(super) fn position(view: &View, pixel: u32, index: u32) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{built_in, CameraChoice, View};
+    use crate::scene::{built_in, CameraChoice, Soup, View};
 
     #[test]
     fn permutations_permute() {
@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn each_cell_column_and_row_holds_one_sample() {
         let scene = built_in("table").unwrap();
-        let camera = scene.camera(&CameraChoice::Auto, glam::DVec3::Y, None, 1.0).unwrap();
+        let camera = scene.camera(&Soup::default(), &CameraChoice::Auto, glam::DVec3::Y, None, 1.0).unwrap();
         for samples in [2, 3, 4, 7, 12, 16, 64, 100] {
             let view = View::new(&scene, camera, (8, 8), samples, 0).unwrap();
             let (columns, rows) = view.strata();

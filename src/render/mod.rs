@@ -11,10 +11,10 @@ pub use plan::{LeftOut, Plan, PlannedBuffer, PlannedPass};
 use crate::bvh::{quantise, Aabb, Bvh};
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::layout::{binding, BindingKind, Features, KernelCode, Step};
+use crate::layout::{binding, BindingKind, Features, KernelCode, ShadowItem, Step};
 use crate::report::{self, Report};
 use crate::scene::{Scene, Soup, View};
-use crate::vulkan::{BindingSlot, Device, DeviceChoice, Fetch, Instance, Kernel, Layout, SlotKind};
+use crate::vulkan::{BindingSlot, Device, DeviceChoice, Fetch, Habits, Instance, Kernel, Layout, SlotKind};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -53,13 +53,13 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Resolves the camera, makes the soup, finds the features.
+    /// Makes the soup, resolves the camera, finds the features.
     ///
     /// # Errors
     /// As [`Options::view`] and [`Soup::of`].
     pub fn new(scene: &Scene, options: &Options) -> Result<Self> {
-        let view = options.view(scene)?;
         let soup = Soup::of(scene)?;
+        let view = options.view(scene, &soup)?;
         let features =
             if options.all_features { Features::ALL } else { crate::scene::features::of(scene, &soup, &view) };
         Ok(Self { soup, view, features })
@@ -72,17 +72,17 @@ impl Renderer {
     /// # Errors
     /// `NoDevice` when there is none; `Vulkan` when the driver refuses.
     pub fn new(choice: &DeviceChoice, validate: bool) -> Result<Self> {
-        Self::with_fetch(choice, validate, None)
+        Self::with_habits(choice, validate, Habits::default())
     }
 
-    /// As [`Renderer::new`], with a wish how kernels fetch the tree and the triangles.
+    /// As [`Renderer::new`], with wishes how the device is used.
     ///
     /// # Errors
     /// As [`Renderer::new`].
-    pub fn with_fetch(choice: &DeviceChoice, validate: bool, fetch: Option<Fetch>) -> Result<Self> {
+    pub fn with_habits(choice: &DeviceChoice, validate: bool, habits: Habits) -> Result<Self> {
         let start = Instant::now();
         let instance = Instance::new(validate)?;
-        let device = Device::open(&instance, choice, fetch)?;
+        let device = Device::open(&instance, choice, habits)?;
         let slots: Vec<BindingSlot> = binding::ALL
             .iter()
             .map(|binding| BindingSlot {
@@ -168,7 +168,10 @@ impl Renderer {
     ) -> Result<(Film, Report)> {
         let _frame = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
         let Prepared { soup, view, features } = prepared;
-        let plan = Plan::new(scene, soup, view, *features, bvh.nodes.len(), options.samples_in_flight);
+        // No queue may be larger than what the device binds at once.
+        let most = self.device.info.max_storage_bytes / size_of::<ShadowItem>() as u64;
+        let in_flight = options.samples_in_flight.min(u32::try_from(most).unwrap_or(u32::MAX));
+        let plan = Plan::new(scene, soup, view, *features, bvh.nodes.len(), in_flight);
         let start = Instant::now();
         let quantised = quantise(bvh, (view.camera.eye - center).abs().as_vec3());
         let frame =

@@ -1,7 +1,7 @@
 //! What a caller may choose.
 
 use crate::error::Result;
-use crate::scene::{Background, CameraChoice, Scene, View};
+use crate::scene::{Background, CameraChoice, Scene, Soup, View};
 use crate::vulkan::DeviceChoice;
 use glam::DVec3;
 use std::sync::atomic::AtomicBool;
@@ -65,13 +65,13 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The view of `scene` that these options mean.
+    /// The view of `scene`, whose triangles are `soup`, that these options mean.
     ///
     /// # Errors
     /// `Usage` when the camera or a number makes no sense.
-    pub fn view(&self, scene: &Scene) -> Result<View> {
+    pub fn view(&self, scene: &Scene, soup: &Soup) -> Result<View> {
         let aspect = f64::from(self.size.0.max(1)) / f64::from(self.size.1.max(1));
-        let camera = scene.camera(&self.camera, self.up, self.fov, aspect)?;
+        let camera = scene.camera(soup, &self.camera, self.up, self.fov, aspect)?;
         let mut view = View::new(scene, camera, self.size, self.samples, self.max_depth)?;
         view.background = self.background;
         Ok(if self.default_light { view.with_default_light(scene) } else { view })

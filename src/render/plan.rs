@@ -150,7 +150,7 @@ impl Plan {
         buffer("colors", per_triangle(features.vertex_colors), false);
         buffer("frame", size_of::<crate::layout::Frame>() as u64, false);
         buffer("materials", (scene.materials.len() * size_of::<Material>()) as u64, false);
-        let lights = if features.shadows { view.lights.len() * size_of::<Light>() } else { 0 };
+        let lights = if features.shadows { view.lights.len().max(1) * size_of::<Light>() } else { 0 };
         buffer("lights", lights as u64, false);
         buffer("hit_queue", queue(true, size_of::<HitItem>()), true);
         buffer("shadow_queue", queue(features.shadows, size_of::<ShadowItem>()), true);

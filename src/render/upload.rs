@@ -46,6 +46,8 @@ impl Scene<'_> {
             }
             binding::LIGHTS => {
                 let lights: Vec<_> = self.view.lights.iter().map(|light| self.light(light)).collect();
+                // The shade pass reads light 0 even where shadows are forced on without any: a dark one.
+                let lights = if lights.is_empty() { vec![layout::Light::default()] } else { lights };
                 let lights = if features.shadows { lights.as_slice() } else { &[] };
                 make("lights", bytemuck::cast_slice(lights), Usage::Storage)
             }

@@ -79,7 +79,7 @@ pub struct Pass {
     pub dispatches: u64,
     /// Items worked on: samples, queue items, pixels.
     pub items: u64,
-    /// Device time by timestamps; 0 where the device has none.
+    /// Device time by timestamps, of at most 16 384 dispatches a wave; 0 where the device has none.
     pub ms: f64,
 }
 

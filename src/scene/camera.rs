@@ -1,6 +1,6 @@
 //! Cameras: where rays start and in which directions they go.
 
-use super::Scene;
+use super::{Scene, Soup};
 use crate::error::{Error, Result};
 use glam::{DMat4, DVec3};
 
@@ -102,12 +102,12 @@ impl Camera {
         (self.right * half_height * aspect, self.up * half_height)
     }
 
-    fn framing(scene: &Scene, aspect: f64, fov: f64) -> Result<Self> {
-        let (lo, hi) = scene.bounds().unwrap_or((DVec3::NEG_ONE, DVec3::ONE));
-        let (center, radius) = ((lo + hi) / 2.0, ((hi - lo).length() / 2.0).max(1e-12));
+    fn framing(bounds: Option<(DVec3, DVec3)>, up: DVec3, aspect: f64, fov: f64) -> Result<Self> {
+        let (lo, hi) = bounds.unwrap_or((DVec3::NEG_ONE, DVec3::ONE));
+        let (center, radius) = ((lo + hi) / 2.0, ((hi - lo).length() / 2.0).max(f64::MIN_POSITIVE));
         let narrow = fov.min(2.0 * ((fov / 2.0).tan() * aspect).atan());
         let distance = radius / (narrow / 2.0).sin();
-        orbit(30.0, 70.0, distance, center, DVec3::Y, Projection::Perspective { fov })
+        orbit(30.0, 70.0, distance, center, up, Projection::Perspective { fov })
     }
 }
 
@@ -118,18 +118,26 @@ fn orbit(theta: f64, phi: f64, radius: f64, target: DVec3, up: DVec3, projection
 }
 
 impl Scene {
-    /// The camera that `choice` means, for a picture of `aspect` = width / height. `up` is used where the choice has no
+    /// The camera that `choice` means, for a picture of this scene and its `soup`, of `aspect` = width / height. `up` is used where the choice has no
     /// up of its own; `fov` (radians, vertical) replaces any perspective camera's.
     ///
     /// # Errors
     /// `Usage` when there is no such camera or it cannot look at anything.
-    pub fn camera(&self, choice: &CameraChoice, up: DVec3, fov: Option<f64>, aspect: f64) -> Result<Camera> {
+    pub fn camera(
+        &self,
+        soup: &Soup,
+        choice: &CameraChoice,
+        up: DVec3,
+        fov: Option<f64>,
+        aspect: f64,
+    ) -> Result<Camera> {
         let perspective = Projection::Perspective { fov: fov.unwrap_or(DEFAULT_FOV) };
-        let center = || self.bounds().map_or(DVec3::ZERO, |(lo, hi)| (lo + hi) / 2.0);
+        let bounds = soup.bounds();
+        let center = || bounds.map_or(DVec3::ZERO, |(lo, hi)| (lo + hi) / 2.0);
         let mut camera = match choice {
             CameraChoice::Auto => match self.cameras.first() {
                 Some((_, camera)) => *camera,
-                None => Camera::framing(self, aspect, fov.unwrap_or(DEFAULT_FOV))?,
+                None => Camera::framing(bounds, up, aspect, fov.unwrap_or(DEFAULT_FOV))?,
             },
             CameraChoice::Named(name) => self.named_camera(name)?,
             CameraChoice::LookAt { eye, target } => {

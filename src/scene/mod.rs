@@ -28,7 +28,7 @@ pub use material::{Material, Whitted};
 pub use soup::{Soup, TriangleFlags};
 pub use view::View;
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DMat4, Vec3};
 
 /// One glTF primitive: triangles of one material.
 #[derive(Clone, Debug, Default)]
@@ -81,19 +81,5 @@ impl Scene {
     /// Triangles of all instances.
     pub fn triangle_count(&self) -> usize {
         self.instances.iter().map(|instance| self.meshes[instance.mesh].triangles.len()).sum()
-    }
-
-    /// World-space corners of the box around all instances; `None` when there is nothing.
-    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let mut bounds: Option<(DVec3, DVec3)> = None;
-        for instance in &self.instances {
-            for position in &self.meshes[instance.mesh].positions {
-                let point = instance.world_from_object.transform_point3(position.as_dvec3());
-                if point.is_finite() {
-                    bounds = Some(bounds.map_or((point, point), |(lo, hi)| (lo.min(point), hi.max(point))));
-                }
-            }
-        }
-        bounds
     }
 }

@@ -39,12 +39,23 @@ pub struct Soup {
 /// Most triangles: a leaf's reference has 27 bits for its first triangle.
 const MAX_TRIANGLES: usize = 1 << 27;
 
+/// Sizes between which the kernels' products of three lengths stay within f32.
+const SIZES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+
+/// What became of an instance.
+struct Added {
+    /// Its transform has no volume: nothing of it was added.
+    flattened: bool,
+    /// Triangles that were dropped because a corner is not finite.
+    not_finite: usize,
+}
+
 impl Soup {
     /// All triangles of a scene. Positions are transformed in f64; normals by the cofactor matrix, which is the inverse
     /// transpose up to a factor and exists for every matrix; a mirroring transform swaps two corners.
     ///
     /// # Errors
-    /// `Content` when there are more than 2²⁷ triangles.
+    /// `Content` when there are more than 2²⁷ triangles, or the scene is too large or too small to be computed.
     pub fn of(scene: &Scene) -> Result<Self> {
         let count = scene.triangle_count();
         if count >= MAX_TRIANGLES {
@@ -56,8 +67,15 @@ impl Soup {
         let mut soup = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, ..Self::default() };
         soup.positions.reserve(count);
         let mut not_finite = 0;
+        let mut flattened = vec![0; scene.meshes.len()];
         for instance in &scene.instances {
-            not_finite += soup.add(scene, instance, smooth, colored);
+            let added = soup.add(scene, instance, smooth, colored);
+            not_finite += added.not_finite;
+            flattened[instance.mesh] += usize::from(added.flattened);
+        }
+        for (mesh, count) in scene.meshes.iter().zip(flattened).filter(|(_, count)| *count > 0) {
+            let name = &mesh.name;
+            soup.warnings.push(format!("dropped {count} instances of mesh '{name}': their transforms flatten them"));
         }
         if not_finite > 0 {
             soup.warnings.push(format!("dropped {not_finite} triangles with a corner that is not a finite number"));
@@ -66,18 +84,22 @@ impl Soup {
             (soup.lo, soup.hi) = (DVec3::ZERO, DVec3::ZERO);
             soup.warnings.push("there is no triangle to draw: the picture shows only the background".into());
         }
+        let size = (soup.hi - soup.lo).max_element();
+        if size != 0.0 && !SIZES.contains(&size) {
+            let (least, most) = (SIZES.start(), SIZES.end());
+            let message = format!("the scene is {size:.1e} m wide: only {least:.0e} to {most:.0e} m can be computed");
+            return Err(Error::content(&scene.name, message));
+        }
         Ok(soup)
     }
 
-    /// Adds an instance and returns how many of its triangles are not finite.
-    fn add(&mut self, scene: &Scene, instance: &Instance, smooth: bool, colored: bool) -> usize {
+    /// Adds an instance.
+    fn add(&mut self, scene: &Scene, instance: &Instance, smooth: bool, colored: bool) -> Added {
         let mesh = &scene.meshes[instance.mesh];
         let linear = DMat3::from_mat4(instance.world_from_object);
         let determinant = linear.determinant();
         if determinant == 0.0 || !determinant.is_finite() {
-            let name = &mesh.name;
-            self.warnings.push(format!("dropped mesh '{name}': its transform flattens it (determinant {determinant})"));
-            return 0;
+            return Added { flattened: true, not_finite: 0 };
         }
         let cofactors = DMat3::from_cols(
             linear.y_axis.cross(linear.z_axis),
@@ -125,7 +147,7 @@ impl Soup {
                 colored: !mesh.colors.is_empty(),
             });
         }
-        not_finite
+        Added { flattened: false, not_finite }
     }
 
     /// Number of triangles.
@@ -136,6 +158,11 @@ impl Soup {
     /// No triangles.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
+    }
+
+    /// Lower and upper corner of the box around everything; `None` when there is nothing.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        (!self.is_empty()).then_some((self.lo, self.hi))
     }
 
     /// Centre of the box around everything: the origin of the device's world, so that f32 is spent on the scene and not

@@ -33,8 +33,7 @@ pub struct View {
 }
 
 impl View {
-    /// A view of `scene`. Without any light in the file and with `default_light`, one parallel light of π lux shines from
-    /// above the camera's left shoulder, so that a white surface that faces it has radiance 1.
+    /// A view of `scene` with the lights that it has.
     ///
     /// # Errors
     /// `Usage` when size, samples or depth are out of bounds.
@@ -56,7 +55,8 @@ impl View {
         Ok(Self { camera, lights, width, height, samples, max_depth, background: Background::default() })
     }
 
-    /// Adds the default light if the file declares none.
+    /// Adds the default light if the file declares none: parallel light of π lux from above the camera's left shoulder, so
+    /// that a white surface that faces it has radiance 1.
     pub fn with_default_light(mut self, scene: &Scene) -> Self {
         if !scene.has_lights {
             let camera = &self.camera;

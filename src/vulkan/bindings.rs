@@ -1,7 +1,7 @@
 //! One descriptor set layout for all kernels, and a set that fills it.
 
 use super::{failed, Buffer, Device, Fetch};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::Arc;
 
@@ -47,8 +47,15 @@ impl Layout {
     /// Set 0 with these slots, and push constants of `push_bytes`.
     ///
     /// # Errors
-    /// `Vulkan` when the driver refuses.
+    /// `NoDevice` when there are more storage buffers than the device allows; `Vulkan` when the driver refuses.
     pub fn new(device: &Arc<Device>, slots: &[BindingSlot], push_bytes: u32) -> Result<Arc<Self>> {
+        let is_storage = |slot: &&BindingSlot| slot.descriptor_type(device.fetch) == vk::DescriptorType::STORAGE_BUFFER;
+        let needed = slots.iter().filter(is_storage).count();
+        let most = device.info.max_storage_buffers;
+        if needed > most as usize {
+            let name = &device.info.name;
+            return Err(Error::NoDevice(format!("{name} shows a kernel {most} storage buffers, {needed} are needed")));
+        }
         let bindings: Vec<_> = slots
             .iter()
             .map(|slot| {

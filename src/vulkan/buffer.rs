@@ -87,13 +87,16 @@ impl Buffer {
     }
 
     /// Makes a buffer that holds `data`, written directly where the host sees device memory, through a staging buffer
-    /// where it does not.
+    /// where it does not; without data, of the least size and undefined content.
     ///
     /// # Errors
     /// As [`Buffer::new`].
     pub fn with_data(device: &Arc<Device>, name: &'static str, data: &[u8], usage: Usage) -> Result<Self> {
         let bytes = data.len() as u64;
-        if device.info.kind != super::DeviceKind::Discrete {
+        if bytes == 0 {
+            return Self::new(device, name, 0, usage, Memory::Device);
+        }
+        if !device.staged {
             let mut buffer = Self::new(device, name, bytes, usage, Memory::Upload)?;
             buffer.write(data)?;
             return Ok(buffer);

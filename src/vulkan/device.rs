@@ -65,6 +65,8 @@ pub struct DeviceInfo {
     pub max_texels: u32,
     /// Most bytes in a storage buffer binding.
     pub max_storage_bytes: u64,
+    /// Most storage buffers that a kernel can see.
+    pub max_storage_buffers: u32,
     /// Why it cannot be used, if it cannot.
     pub unusable: Option<String>,
 }
@@ -95,8 +97,19 @@ pub struct Device {
     pub info: DeviceInfo,
     /// How kernels fetch on this device.
     pub fetch: Fetch,
+    /// Uploads go through a staging buffer, because the host does not see the device's memory.
+    pub(super) staged: bool,
     /// The instance, for its validation messages.
     pub instance: Arc<Instance>,
+}
+
+/// How to use a device, where its kind and limits are not to decide. For tests of paths that other devices take.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Habits {
+    /// Through which buffers kernels fetch.
+    pub fetch: Option<Fetch>,
+    /// Uploads through a staging buffer.
+    pub staged: Option<bool>,
 }
 
 /// Bytes of device memory that buffers hold.
@@ -115,22 +128,22 @@ impl Device {
         Ok(instance.physical_devices()?.into_iter().map(|device| describe(instance, device)).collect())
     }
 
-    /// Opens a device. Without a wish, kernels fetch in the way that suits it.
+    /// Opens a device. What `habits` leave open, its kind and limits decide.
     ///
     /// # Errors
     /// `NoDevice` when none fits the choice; `Vulkan` when the driver refuses.
-    pub fn open(instance: &Arc<Instance>, choice: &DeviceChoice, fetch: Option<Fetch>) -> Result<Arc<Self>> {
+    pub fn open(instance: &Arc<Instance>, choice: &DeviceChoice, habits: Habits) -> Result<Arc<Self>> {
         let physical = instance.physical_devices()?;
         let infos: Vec<DeviceInfo> = physical.iter().map(|device| describe(instance, *device)).collect();
         let index = choose(&infos, choice)?;
-        Self::open_physical(instance, physical[index], infos[index].clone(), fetch)
+        Self::open_physical(instance, physical[index], infos[index].clone(), habits)
     }
 
     fn open_physical(
         instance: &Arc<Instance>,
         physical: vk::PhysicalDevice,
         info: DeviceInfo,
-        fetch: Option<Fetch>,
+        habits: Habits,
     ) -> Result<Arc<Self>> {
         let (queue_family, timestamp_bits) = compute_family(instance, physical)
             .ok_or_else(|| Error::NoDevice(format!("{} has no compute queue", info.name)))?;
@@ -167,8 +180,9 @@ impl Device {
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             timestamp_period: (timestamp_bits > 0).then_some(f64::from(properties.limits.timestamp_period)),
             memory: Mutex::default(),
+            fetch: habits.fetch.unwrap_or(suitable),
+            staged: habits.staged.unwrap_or(info.kind == DeviceKind::Discrete),
             info,
-            fetch: fetch.unwrap_or(suitable),
             instance: instance.clone(),
         });
         device.set_name(device.raw.handle(), "glimt");
@@ -246,6 +260,10 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> DeviceInfo {
         subgroup_size: subgroup.subgroup_size,
         max_texels: core.limits.max_texel_buffer_elements,
         max_storage_bytes: core.limits.max_storage_buffer_range.into(),
+        max_storage_buffers: core
+            .limits
+            .max_per_stage_descriptor_storage_buffers
+            .min(core.limits.max_descriptor_set_storage_buffers),
         unusable: None,
     };
     info.unusable = unusable(instance, physical, api);

@@ -21,7 +21,7 @@ mod kernel;
 pub use bindings::{BindingSlot, Bindings, Layout, SlotKind};
 pub use buffer::{Buffer, Memory, Usage};
 pub use commands::{Access, Commands};
-pub use device::{Device, DeviceChoice, DeviceInfo, DeviceKind, Fetch};
+pub use device::{Device, DeviceChoice, DeviceInfo, DeviceKind, Fetch, Habits};
 pub use instance::Instance;
 pub use kernel::Kernel;
 

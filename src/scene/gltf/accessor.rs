@@ -4,10 +4,13 @@ use super::Document;
 use crate::error::Result;
 use ::gltf::json::accessor::{ComponentType, Type};
 use ::gltf::json::{buffer, validation::Checked, Index};
-use rayon::prelude::*;
 
 /// Most elements of an accessor that no buffer view backs: there the count alone decides what is allocated.
-const MOST_UNBACKED: u64 = 1 << 26;
+const MOST_UNBACKED: u64 = 1 << 20;
+/// Most numbers that all meshes of a document are made of: 2 GiB. Many primitives may name the same bytes.
+const MOST_NUMBERS: u64 = 1 << 29;
+/// Most numbers that are checked against their bounds and for being finite.
+const MOST_CHECKED: u64 = 1 << 28;
 
 /// Values of an accessor, `components` to an element.
 pub(super) struct Elements<T> {
@@ -47,6 +50,7 @@ fn integer(kind: ComponentType, bytes: &[u8]) -> u32 {
 impl Document<'_> {
     /// Elements as floats.
     pub fn floats(&self, index: usize) -> Result<Elements<f32>> {
+        self.spend(index)?;
         let accessor = &self.root.accessors[index];
         let normalized = accessor.normalized;
         self.read(index, 0.0, |kind, bytes| number(kind, normalized, bytes))
@@ -55,6 +59,7 @@ impl Document<'_> {
     /// Elements of a scalar accessor of unsigned integers.
     pub fn indices(&self, index: usize) -> Result<Vec<u32>> {
         let refuse = |message: &str| Err(self.refuse(format!("accessors[{index}]: {message}")));
+        self.spend(index)?;
         let elements = self.read(index, 0, integer)?;
         let restart = match &self.root.accessors[index].component_type {
             Checked::Valid(kind) if kind.0 == ComponentType::U8 => u32::from(u8::MAX),
@@ -71,10 +76,38 @@ impl Document<'_> {
         Ok(elements.values)
     }
 
+    /// Takes an accessor's numbers from what the document may still allocate.
+    fn spend(&self, index: usize) -> Result<()> {
+        let spent = self.spent.get().saturating_add(self.numbers(index));
+        self.spent.set(spent);
+        if spent > MOST_NUMBERS {
+            return Err(self.refuse("its meshes have more data than 2 GiB"));
+        }
+        Ok(())
+    }
+
+    /// Numbers in an accessor, as it claims.
+    fn numbers(&self, index: usize) -> u64 {
+        let accessor = &self.root.accessors[index];
+        let components = match &accessor.type_ {
+            Checked::Valid(shape) => shape.multiplicity() as u64,
+            Checked::Invalid => 1,
+        };
+        accessor.count.0.saturating_mul(components)
+    }
+
     /// Warns of accessors whose data do not keep to their min and max, or are not finite.
     pub fn check_data(&mut self) {
-        let faults: Vec<String> =
-            (0..self.root.accessors.len()).into_par_iter().filter_map(|index| self.data_fault(index)).collect();
+        let mut checked = 0_u64;
+        let mut faults = Vec::new();
+        for index in 0..self.root.accessors.len() {
+            let accessor = &self.root.accessors[index];
+            checked = checked.saturating_add(self.numbers(index));
+            // Without data there are only zeros, and beyond the limit a check would take longer than the picture.
+            if (accessor.buffer_view.is_some() || accessor.sparse.is_some()) && checked <= MOST_CHECKED {
+                faults.extend(self.data_fault(index));
+            }
+        }
         faults.into_iter().for_each(|fault| self.warnings.add(fault));
     }
 

@@ -3,7 +3,7 @@
 use super::Warnings;
 use ::gltf::json::{Buffer, Root};
 use base64::{engine::general_purpose, Engine};
-use std::path::Path;
+use std::path::{Component, Path};
 
 /// Largest buffer, so that a declared length alone allocates nothing absurd.
 const LARGEST: u64 = 1 << 34;
@@ -29,7 +29,7 @@ pub(super) fn load(
             _ => Ok(bytes),
         });
         // A BIN chunk may be padded by up to three bytes.
-        let most = declared + if buffer.uri.is_none() { 3 } else { 0 };
+        let most = declared.saturating_add(if buffer.uri.is_none() { 3 } else { 0 });
         match bytes {
             Ok(bytes) => {
                 if bytes.len() as u64 > most {
@@ -85,9 +85,15 @@ fn read_beside(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
     let folder =
         folder.ok_or(format!("'{uri}' is a file beside the document, but there is none beside standard input"))?;
     let name = percent_encoding::percent_decode_str(uri).decode_utf8().map_err(|_| format!("'{uri}' is not UTF-8"))?;
-    if Path::new(name.as_ref()).is_absolute() {
-        return Err(format!("'{uri}' is not relative to the document"));
+    let plain = |part| matches!(part, Component::Normal(_) | Component::CurDir);
+    if !Path::new(name.as_ref()).components().all(plain) {
+        return Err(format!("'{uri}' does not lie beside or below the document"));
     }
     let path = folder.join(name.as_ref());
+    let refuse = |why: &dyn std::fmt::Display| format!("cannot read {}: {why}", path.display());
+    let data = std::fs::metadata(&path).map_err(|error| refuse(&error))?;
+    if !data.is_file() || data.len() > LARGEST {
+        return Err(refuse(&"it is no file of a sensible size"));
+    }
     std::fs::read(&path).map_err(|error| format!("cannot read {}: {error}", path.display()))
 }

@@ -94,14 +94,17 @@ impl Document<'_> {
             if material.alpha_mode != Checked::Valid(AlphaMode::Opaque) {
                 self.warnings.add("approximated: a material with alpha MASK or BLEND is drawn opaque");
             }
+            let unlit = extension("KHR_materials_unlit").is_some();
+            let emission = DVec3::from_array(material.emissive_factor.0.map(f64::from)).max(DVec3::ZERO) * strength;
             scene.materials.push(Material {
                 name: material.name.clone().unwrap_or_default(),
                 base_color: DVec3::new(r, g, b).max(DVec3::ZERO),
                 metallic: f64::from(factors.metallic_factor.0).clamp(0.0, 1.0),
                 roughness: f64::from(factors.roughness_factor.0).clamp(0.0, 1.0),
-                emission: DVec3::from_array(material.emissive_factor.0.map(f64::from)).max(DVec3::ZERO) * strength,
+                // Unlit is the base colour and nothing else.
+                emission: if unlit { DVec3::ZERO } else { emission },
                 double_sided: material.double_sided,
-                unlit: extension("KHR_materials_unlit").is_some(),
+                unlit,
                 whitted: exact,
             });
         }

@@ -19,6 +19,7 @@ use super::Scene;
 use crate::error::{Error, Result};
 use ::gltf::json::Root;
 use serde_json::Value;
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
@@ -89,6 +90,8 @@ struct Document<'a> {
     /// Content of each buffer, or why there is none.
     buffers: Vec<Result<Vec<u8>, String>>,
     warnings: Warnings,
+    /// Numbers that accessors have been expanded to.
+    spent: Cell<u64>,
 }
 
 impl<'a> Document<'a> {
@@ -103,7 +106,7 @@ impl<'a> Document<'a> {
         check::required_extensions(&value).map_err(refuse)?;
         check::document(&value, container.binary.is_some(), &mut warnings).map_err(refuse)?;
         let root = typed(container.json, value).map_err(|error| refuse(format!("not a glTF document: {error}")))?;
-        Ok(Self { file, root, buffers: Vec::new(), warnings })
+        Ok(Self { file, root, buffers: Vec::new(), warnings, spent: Cell::new(0) })
     }
 
     fn refuse(&self, message: impl ToString) -> Error {

@@ -9,6 +9,9 @@ use ::gltf::json::validation::Checked;
 use glam::{DMat4, DQuat, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
+/// Most instances of meshes in a scene.
+const MOST_INSTANCES: usize = 1 << 22;
+
 impl Document<'_> {
     /// Walks the chosen scene's nodes. Transforms are composed in f64.
     pub fn add_nodes(&mut self, scene: &mut Scene, primitives: &[Vec<usize>], choice: Option<&str>) -> Result<()> {
@@ -23,15 +26,15 @@ impl Document<'_> {
             let node = self.root.nodes[index].clone();
             let world_from_node = world_from_parent * local_transform(&node);
             if let Some(mesh) = node.mesh {
-                let places = self.instance_transforms(index, &node)?;
-                for object_from_instance in places.iter().flatten() {
-                    let world_from_object = world_from_node * *object_from_instance;
-                    let instance = |mesh: &usize| Instance { mesh: *mesh, world_from_object };
-                    scene.instances.extend(primitives[mesh.value()].iter().map(instance));
+                let places = self.instance_transforms(index, &node)?.unwrap_or_else(|| vec![DMat4::IDENTITY]);
+                let meshes = &primitives[mesh.value()];
+                if scene.instances.len() + places.len().saturating_mul(meshes.len()) > MOST_INSTANCES {
+                    return Err(self.refuse(format!("more than {MOST_INSTANCES} instances of meshes")));
                 }
-                if places.is_none() {
-                    let instance = |mesh: &usize| Instance { mesh: *mesh, world_from_object: world_from_node };
-                    scene.instances.extend(primitives[mesh.value()].iter().map(instance));
+                for object_from_instance in places {
+                    let world_from_object = world_from_node * object_from_instance;
+                    let instance = |mesh: &usize| Instance { mesh: *mesh, world_from_object };
+                    scene.instances.extend(meshes.iter().map(instance));
                 }
             }
             if let Some(camera) = node.camera {

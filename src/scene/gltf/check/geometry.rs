@@ -2,6 +2,7 @@
 
 use super::{list, number, selected, Warnings};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 
 pub(super) fn buffers(root: &Value, has_binary: bool, warnings: &mut Warnings) {
     if has_binary && list(root, "buffers").first().is_none_or(|first| first.get("uri").is_some()) {
@@ -109,6 +110,11 @@ pub(super) fn accessors(root: &Value, warnings: &mut Warnings) {
 pub(super) fn meshes(root: &Value, warnings: &mut Warnings) -> Result<(), String> {
     let accessors = list(root, "accessors");
     let accessor = |value: &Value| value.as_u64().and_then(|index| accessors.get(index as usize));
+    // How many accessors each buffer view serves.
+    let mut users: BTreeMap<u64, usize> = BTreeMap::new();
+    for view in accessors.iter().filter_map(|accessor| accessor.get("bufferView")?.as_u64()) {
+        *users.entry(view).or_default() += 1;
+    }
     for (path, primitive) in selected(root, "meshes.*.primitives.*") {
         let Some(attributes) = primitive.get("attributes").and_then(Value::as_object) else {
             return Err(format!("{path} has no attributes"));
@@ -130,7 +136,7 @@ pub(super) fn meshes(root: &Value, warnings: &mut Warnings) -> Result<(), String
             if plain.ends_with('_') && name[plain.len()..].parse::<usize>().is_ok_and(|n| n > 0 && !series(n - 1)) {
                 warnings.add(format!("{path}.attributes.{name}: the numbers before it are missing"));
             }
-            attribute_format(root, &path, name, accessor(value), warnings);
+            attribute_format(root, &users, &path, name, accessor(value), warnings);
         }
         for n in 0..2 {
             if attributes.contains_key(&format!("JOINTS_{n}")) != attributes.contains_key(&format!("WEIGHTS_{n}")) {
@@ -167,7 +173,14 @@ pub(super) fn meshes(root: &Value, warnings: &mut Warnings) -> Result<(), String
 }
 
 /// Types that an attribute may have (glTF 2.0, 3.7.2.1; KHR_mesh_quantization widens them).
-fn attribute_format(root: &Value, path: &str, name: &str, accessor: Option<&Value>, warnings: &mut Warnings) {
+fn attribute_format(
+    root: &Value,
+    users: &BTreeMap<u64, usize>,
+    path: &str,
+    name: &str,
+    accessor: Option<&Value>,
+    warnings: &mut Warnings,
+) {
     let Some(accessor) = accessor else { return };
     let quantized = list(root, "extensionsUsed").iter().any(|used| used == "KHR_mesh_quantization");
     let kind = accessor.get("componentType").and_then(Value::as_u64).unwrap_or(0);
@@ -206,9 +219,7 @@ fn attribute_format(root: &Value, path: &str, name: &str, accessor: Option<&Valu
     {
         warnings.add(format!("{path}.attributes.{name}: vertices are not aligned to 4 bytes"));
     }
-    let shared =
-        list(root, "accessors").iter().filter(|other| other.get("bufferView").and_then(Value::as_u64) == view_index);
-    if stride.is_none() && view_index.is_some() && shared.count() > 1 {
+    if stride.is_none() && view_index.is_some_and(|view| users.get(&view) > Some(&1)) {
         warnings
             .add(format!("{path}.attributes.{name}: its bufferView serves several accessors and has no byteStride"));
     }

@@ -39,18 +39,17 @@ pub(super) fn nodes(root: &Value, warnings: &mut Warnings) -> Result<(), String>
             }
         }
     }
+    // Up from every node, each node once: one that is met again on the same way up is its own ancestor.
+    let mut seen_from = vec![usize::MAX; nodes.len()];
     for start in 0..nodes.len() {
-        let mut above = parents[start];
-        for _ in 0..nodes.len() {
-            let Some(node) = above else { break };
-            if node == start {
-                return Err(format!("nodes[{start}] is its own ancestor"));
+        let mut node = start;
+        while seen_from[node] == usize::MAX {
+            seen_from[node] = start;
+            let Some(parent) = parents[node] else { break };
+            if seen_from[parent] == start {
+                return Err(format!("nodes[{parent}] is its own ancestor"));
             }
-            above = parents[node];
-        }
-        // A chain as long as there are nodes costs a square; beyond this only the walk itself looks.
-        if start > 4096 {
-            break;
+            node = parent;
         }
     }
     select(root, "scenes.*.nodes.*", &mut |path, value| {
@@ -121,6 +120,16 @@ pub(super) fn skins_and_animations(root: &Value, warnings: &mut Warnings) {
     }
     for (path, animation) in selected(root, "animations.*") {
         for (index, sampler) in list(animation, "samplers").iter().enumerate() {
+            let count = |name: &str| accessor(sampler.get(name)).and_then(|accessor| number(accessor, "count"));
+            let cubic = sampler.get("interpolation").and_then(Value::as_str) == Some("CUBICSPLINE");
+            let key_values = if cubic { 3.0 } else { 1.0 };
+            if let (Some(input), Some(output)) = (count("input"), count("output")) {
+                let weights = targets_weights(animation, index);
+                let fits = if weights { output % (input * key_values) == 0.0 } else { output == input * key_values };
+                if !fits {
+                    warnings.add(format!("{path}.samplers[{index}]: {input} times do not fit {output} values"));
+                }
+            }
             if let Some(input) = accessor(sampler.get("input")) {
                 if !is(input, "SCALAR", 5126) || input.get("min").is_none() || input.get("max").is_none() {
                     warnings.add(format!("{path}.samplers[{index}].input must be float scalars with min and max"));
@@ -143,7 +152,16 @@ pub(super) fn skins_and_animations(root: &Value, warnings: &mut Warnings) {
     }
 }
 
-/// Factors outside 0 to 1 and textures whose coordinates no mesh has.
+/// A channel of the sampler moves morph targets: then there are several values a time.
+fn targets_weights(animation: &Value, sampler: usize) -> bool {
+    list(animation, "channels").iter().any(|channel| {
+        let own = channel.get("sampler").and_then(Value::as_u64) == Some(sampler as u64);
+        let path = channel.pointer("/target/path").and_then(Value::as_str).unwrap_or_default();
+        own && !["translation", "rotation", "scale"].contains(&path)
+    })
+}
+
+/// Factors of extensions that are out of range.
 pub(super) fn materials(root: &Value, warnings: &mut Warnings) {
     for (path, material) in selected(root, "materials.*") {
         let Some(extensions) = material.get("extensions").and_then(Value::as_object) else { continue };
