@@ -126,7 +126,7 @@ fn silhouettes_are_the_goldens() {
     println!("{:<34} renderers  median difference", "scenario");
     for (name, scenario) in &scenarios {
         let own = |model: &&Model| model.path.starts_with(&format!("models/{}/", scenario["model"].as_str().unwrap()));
-        let Some(model) = models.iter().filter(is_supported_ref).find(own) else {
+        let Some(model) = models.iter().filter(|model| is_supported(model)).find(own) else {
             println!("{name:<34} needs an extension");
             continue;
         };
@@ -158,10 +158,6 @@ fn silhouettes_are_the_goldens() {
     }
     println!("{checked} scenarios checked");
     assert!(checked >= 15 && faults.is_empty(), "{checked} checked, {faults:?}");
-}
-
-fn is_supported_ref(model: &&Model) -> bool {
-    is_supported(model)
 }
 
 /// The validator's own files: what it calls an error is refused or warned of, except what lies in image data, which are not

@@ -351,13 +351,17 @@ fn small_files_cannot_ask_for_much() {
 
 #[test]
 fn buffers_lie_beside_the_document() {
-    let folder = tempfile::tempdir().unwrap();
-    for uri in ["../../../../dev/zero", "/dev/zero", "a/../../b.bin", ".", "missing.bin"] {
+    let outside = tempfile::tempdir().unwrap();
+    let folder = outside.path().join("document");
+    std::fs::create_dir(&folder).unwrap();
+    // Readable and long enough: refused for its place alone.
+    std::fs::write(outside.path().join("b.bin"), [0; 36]).unwrap();
+    for uri in ["../b.bin", "../../../../dev/zero", "/dev/zero", ".", "missing.bin"] {
         let mut builder = Builder::default();
         let positions = builder.floats("VEC3", &TRIANGLE);
         let more = json!({"buffers": [{"byteLength": 36, "uri": uri}]});
         let document = builder.document(json!({"attributes": {"POSITION": positions}}), more).to_string();
-        let result = gltf::parse(document.as_bytes(), "test".into(), "test.gltf", Some(folder.path()), None);
+        let result = gltf::parse(document.as_bytes(), "test".into(), "test.gltf", Some(&folder), None);
         assert!(message(result).contains("buffers[0]"), "{uri}");
     }
 }
