@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand, each turning flags into options and results into text.
 
+mod bench;
 mod completions;
 mod devices;
 mod diff;
@@ -11,9 +12,9 @@ mod values;
 mod view;
 
 use clap::{Parser, Subcommand};
-use glimt::{scene, Error, Result, Scene};
+use glimt::{scene, Error, Options, Result, Scene};
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -56,6 +57,7 @@ Examples:
   glimt render cornell --json | jq .times_ms        one JSON object on standard output
   cat model.glb | glimt render - -o - > out.png     from a pipe to a pipe
   glimt explain model.glb                           what is computed, what is left out, and why
+  glimt bench model.glb --sets primary,shadow        how fast rays of a view are traced
   glimt diff a.png b.png --max-rmse 0.004           exit code 1 when they differ more
 
 Exit codes: 0 done · 1 a check said no · 2 bad usage or input · 3 no usable device, or it failed · 4 output not written ·
@@ -79,6 +81,8 @@ enum Command {
     Explain(explain::ExplainArgs),
     /// List the Vulkan devices
     Devices(devices::DevicesArgs),
+    /// Measure how fast rays are traced and trees are built
+    Bench(bench::BenchArgs),
     /// Compare two pictures: RMSE, PSNR, maximum difference, SSIM, FLIP
     Diff(diff::DiffArgs),
     /// Print a completion script for a shell
@@ -88,7 +92,7 @@ enum Command {
 impl Cli {
     /// The command writes a file, so that Ctrl-C must let it clean up.
     pub fn writes_files(&self) -> bool {
-        matches!(self.command, Command::Render(_) | Command::Diff(_))
+        matches!(self.command, Command::Render(_) | Command::Diff(_) | Command::Bench(_))
     }
 
     /// Runs the command.
@@ -101,6 +105,7 @@ impl Cli {
             Command::Info(args) => args.run(),
             Command::Explain(args) => args.run(),
             Command::Devices(args) => args.run(),
+            Command::Bench(args) => args.run(context),
             Command::Diff(args) => args.run(context),
             Command::Completions(args) => args.run(),
         }
@@ -124,6 +129,29 @@ fn load_scene(name: &str, scene_choice: Option<&str>) -> Result<Scene> {
         )),
         error => error,
     })
+}
+
+/// Threads of host work and of software Vulkan; all of the machine's for `None`.
+fn set_threads(threads: Option<usize>) -> Result<()> {
+    let Some(threads) = threads else { return Ok(()) };
+    let refuse = |why: String| Error::Usage(format!("--threads {threads}: {why}"));
+    if !(1..=1024).contains(&threads) {
+        return Err(refuse("must be 1 to 1024".into()));
+    }
+    // Mesa's software Vulkan reads this when the device is opened; until then only Ctrl-C has a thread, which waits.
+    std::env::set_var("LP_NUM_THREADS", threads.to_string());
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|error| refuse(error.to_string()))
+}
+
+fn stop_if_interrupted(options: &Options) -> Result<()> {
+    match options.interrupted.load(Ordering::Relaxed) {
+        true => Err(Error::Interrupted),
+        false => Ok(()),
+    }
+}
+
+fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
 }
 
 #[cfg(test)]

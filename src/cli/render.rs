@@ -1,15 +1,14 @@
 //! `glimt render`.
 
 use super::view::ViewArgs;
-use super::{load_scene, progress, Context, Outcome};
+use super::{load_scene, milliseconds, progress, set_threads, stop_if_interrupted, Context, Outcome};
 use clap::{Args, ValueHint};
 use glimt::film::{Film, Format, Saved};
-use glimt::render::{build_tree, describe, Prepared, Renderer};
+use glimt::render::{describe, Prepared, Renderer, Tree};
 use glimt::scene::Background;
 use glimt::vulkan::DeviceChoice;
 use glimt::{reference, report, Error, Options, Report, Result, Scene};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Flags of `glimt render`.
@@ -62,7 +61,7 @@ impl RenderArgs {
         if target.format == Format::Hdr && options.background == Background::Transparent {
             return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
         }
-        self.set_threads()?;
+        set_threads(self.threads)?;
 
         let (film, mut report) = match self.device.as_deref() {
             Some("reference") => self.on_reference(&options)?,
@@ -97,11 +96,11 @@ impl RenderArgs {
             let (scene, prepared) = self.load(options)?;
             let load = milliseconds(start);
             let start = Instant::now();
-            let (bvh, center) = build_tree(&prepared.soup);
+            let tree = Tree::build(&prepared.soup);
             let bvh_ms = milliseconds(start);
             stop_if_interrupted(options)?;
             let renderer = device.join().map_err(|_| Error::Device("opening it failed".into()))??;
-            let (film, mut report) = renderer.render_with_tree(&scene, &prepared, options, &bvh, center)?;
+            let (film, mut report) = renderer.render_with_tree(&scene, &prepared, options, &tree)?;
             (report.times_ms.load, report.times_ms.bvh) = (load, bvh_ms);
             Ok((film, report))
         })
@@ -129,17 +128,6 @@ impl RenderArgs {
         stop_if_interrupted(options)?;
         let prepared = Prepared::new(&scene, options)?;
         Ok((scene, prepared))
-    }
-
-    fn set_threads(&self) -> Result<()> {
-        let Some(threads) = self.threads else { return Ok(()) };
-        let refuse = |why: String| Error::Usage(format!("--threads {threads}: {why}"));
-        if !(1..=1024).contains(&threads) {
-            return Err(refuse("must be 1 to 1024".into()));
-        }
-        // Mesa's software Vulkan reads this when the device is opened; until then only Ctrl-C has a thread, which waits.
-        std::env::set_var("LP_NUM_THREADS", threads.to_string());
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|error| refuse(error.to_string()))
     }
 }
 
@@ -178,17 +166,6 @@ impl Target {
         }
         film.save(&self.path, self.format, may_finish)
     }
-}
-
-fn stop_if_interrupted(options: &Options) -> Result<()> {
-    match options.interrupted.load(Ordering::Relaxed) {
-        true => Err(Error::Interrupted),
-        false => Ok(()),
-    }
-}
-
-fn milliseconds(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }
 
 #[cfg(test)]

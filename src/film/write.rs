@@ -71,6 +71,17 @@ pub fn check_writable(path: &Path) -> Result<()> {
     temporary(path).map(drop)
 }
 
+/// Writes a file as a whole or not at all: to a temporary file beside it, which is renamed.
+///
+/// # Errors
+/// `Write` when that fails.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut file = temporary(path)?;
+    file.write_all(bytes).map_err(|error| Error::write(path, error))?;
+    file.persist(path).map_err(|error| Error::write(path, error.error))?;
+    Ok(())
+}
+
 impl Film {
     /// Writes the picture to a temporary file in the target's folder and renames it, so that the target is never half
     /// written; calls `may_finish` just before the rename.

@@ -5,6 +5,9 @@
 //! written down again from their sources.
 
 mod sampling;
+mod verdict;
+
+pub use verdict::allows;
 
 use crate::error::{Error, Result};
 use crate::film::Film;

@@ -15,24 +15,25 @@ use std::sync::Arc;
 
 /// A scene on the device, ready to run.
 pub(super) struct Frame<'a> {
-    renderer: &'a Renderer,
+    pub renderer: &'a Renderer,
     view: &'a View,
     plan: Plan,
-    kernels: Kernels,
+    pub kernels: Kernels,
     // Dropped before the buffers it names.
-    bindings: Bindings,
-    buffers: Vec<Buffer>,
+    pub bindings: Bindings,
+    /// By slot.
+    pub buffers: Vec<Buffer>,
     /// Where the host reads: the counters of a wave, then the film of a band.
     read_back: Buffer,
 }
 
 /// The kernels of the passes that this frame has.
-struct Kernels {
-    primary: Arc<Kernel>,
+pub(super) struct Kernels {
+    pub primary: Arc<Kernel>,
     prepare: Arc<Kernel>,
     shade: Arc<Kernel>,
-    shadow: Option<Arc<Kernel>>,
-    reflection: Option<Arc<Kernel>>,
+    pub shadow: Option<Arc<Kernel>>,
+    pub reflection: Option<Arc<Kernel>>,
     resolve: Arc<Kernel>,
 }
 
@@ -52,7 +53,7 @@ const MOST_TIMED: u64 = 16_384;
 
 impl<'a> Frame<'a> {
     /// Allocates and fills the buffers of the plan and makes its kernels.
-    pub fn new(renderer: &'a Renderer, scene: upload::Scene<'a>, plan: Plan) -> Result<Self> {
+    pub fn new(renderer: &'a Renderer, view: &'a View, scene: upload::Scene, plan: Plan) -> Result<Self> {
         let features = plan.features;
         let kernel = |code| renderer.kernel(code, features);
         let kernels = Kernels {
@@ -76,7 +77,7 @@ impl<'a> Frame<'a> {
         let bindings = Bindings::new(&renderer.layout, |slot| &buffers[slot as usize])?;
         let read_back = COUNTER_BYTES as u64 + u64::from(plan.band_pixels) * PIXEL_BYTES as u64;
         let read_back = Buffer::new(&renderer.device, "read back", read_back, Usage::Storage, Memory::ReadBack)?;
-        Ok(Self { renderer, view: scene.view, plan, kernels, bindings, buffers, read_back })
+        Ok(Self { renderer, view, plan, kernels, bindings, buffers, read_back })
     }
 
     /// Records one wave: the whole algorithm.
@@ -129,7 +130,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Makes filled queues ready, with a barrier on either side.
-    fn prepare(&self, commands: &mut Commands, queues: u32) {
+    pub fn prepare(&self, commands: &mut Commands, queues: u32) {
         // Queues and counters: the pass before filled them, prepare reads.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
         commands.dispatch(&self.kernels.prepare, bytemuck::bytes_of(&Step { queues, ..Step::default() }), 1);
@@ -200,6 +201,17 @@ fn even_bits(code: usize) -> usize {
     code & 1 | code >> 1 & 2 | code >> 2 & 4
 }
 
+/// Refuses the answers of a wave in which a walk was cut short.
+pub(super) fn all_complete(counters: &[u32]) -> Result<()> {
+    match counters[COUNTER_LOST as usize] {
+        0 => Ok(()),
+        lost => Err(Error::Device(format!(
+            "{lost} rays meet more boxes and triangles than this driver's loops allow; \
+             the picture would be wrong and was not written"
+        ))),
+    }
+}
+
 /// Sums over waves.
 struct Totals {
     passes: Vec<report::Pass>,
@@ -231,13 +243,7 @@ impl Totals {
         self.hits += total(QUEUE_HIT);
         self.shadow += total(QUEUE_SHADOW);
         self.reflection += total(QUEUE_REFLECTION);
-        match counters[COUNTER_LOST as usize] {
-            0 => Ok(()),
-            lost => Err(Error::Device(format!(
-                "{lost} rays meet more boxes and triangles than this driver's loops allow; \
-                 the picture would be wrong and was not written"
-            ))),
-        }
+        all_complete(counters)
     }
 
     fn outcome(mut self, view: &View, plan: &Plan) -> Outcome {

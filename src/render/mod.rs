@@ -3,12 +3,17 @@
 mod frame;
 mod options;
 mod plan;
+pub mod ray_sets;
+mod trace;
+mod tree;
 mod upload;
 
 pub use options::{Options, Progress};
 pub use plan::{LeftOut, Plan, PlannedBuffer, PlannedPass};
+pub use trace::{Met, Trace, Tracer};
+pub use tree::Tree;
 
-use crate::bvh::{quantise, Aabb, Bvh};
+use crate::bvh::quantise;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{binding, BindingKind, Features, KernelCode, ShadowItem, Step};
@@ -146,9 +151,9 @@ impl Renderer {
     /// As [`render`].
     pub fn render_prepared(&self, scene: &Scene, prepared: &Prepared, options: &Options) -> Result<(Film, Report)> {
         let start = Instant::now();
-        let (bvh, center) = build_tree(&prepared.soup);
+        let tree = Tree::build(&prepared.soup);
         let bvh_ms = milliseconds(start);
-        self.render_with_tree(scene, prepared, options, &bvh, center).map(|(film, mut report)| {
+        self.render_with_tree(scene, prepared, options, &tree).map(|(film, mut report)| {
             report.times_ms.bvh = bvh_ms;
             (film, report)
         })
@@ -163,19 +168,18 @@ impl Renderer {
         scene: &Scene,
         prepared: &Prepared,
         options: &Options,
-        bvh: &Bvh,
-        center: glam::DVec3,
+        tree: &Tree,
     ) -> Result<(Film, Report)> {
         let _frame = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
         let Prepared { soup, view, features } = prepared;
         // No queue may be larger than what the device binds at once.
         let most = self.device.info.max_storage_bytes / size_of::<ShadowItem>() as u64;
         let in_flight = options.samples_in_flight.min(u32::try_from(most).unwrap_or(u32::MAX));
-        let plan = Plan::new(scene, soup, view, *features, bvh.nodes.len(), in_flight);
+        let plan = Plan::new(scene, soup, view, *features, tree.bvh.nodes.len(), in_flight);
         let start = Instant::now();
-        let quantised = quantise(bvh, (view.camera.eye - center).abs().as_vec3());
+        let quantised = quantise(&tree.bvh, (view.camera.eye - tree.center).abs().as_vec3());
         let frame =
-            frame::Frame::new(self, upload::Scene { scene, soup, view, bvh, quantised: &quantised, center }, plan)?;
+            frame::Frame::new(self, view, upload::Scene { scene, soup, view, tree, quantised: &quantised }, plan)?;
         let upload = milliseconds(start);
         let start = Instant::now();
         let (film, outcome) = frame.run(options)?;
@@ -184,17 +188,10 @@ impl Renderer {
         if !messages.is_empty() {
             return Err(Error::Validation(messages));
         }
-        let stats = bvh.stats();
-        let info = &self.device.info;
+        let stats = tree.bvh.stats();
         let report = Report {
             image: report::Image { width: view.width, height: view.height, ..Default::default() },
-            device: report::Device {
-                name: info.name.clone(),
-                driver: info.driver.clone(),
-                api: info.api.clone(),
-                kind: info.kind.name().into(),
-                subgroup_size: info.subgroup_size,
-            },
+            device: describe_device(&self.device),
             scene: describe(scene, soup, view),
             features: features.list().into_iter().collect(),
             passes: outcome.passes,
@@ -223,13 +220,16 @@ pub fn describe(scene: &Scene, soup: &Soup, view: &View) -> report::Scene {
     }
 }
 
-/// The tree over a soup in the device's world, and that world's origin: the soup's centre.
-pub fn build_tree(soup: &Soup) -> (Bvh, glam::DVec3) {
-    use rayon::prelude::*;
-    let center = soup.center();
-    let boxes: Vec<Aabb> =
-        soup.positions.par_iter().map(|corners| Aabb::of(corners.map(|corner| (corner - center).as_vec3()))).collect();
-    (Bvh::build(&boxes), center)
+/// The device's part of a report.
+pub fn describe_device(device: &Device) -> report::Device {
+    let info = &device.info;
+    report::Device {
+        name: info.name.clone(),
+        driver: info.driver.clone(),
+        api: info.api.clone(),
+        kind: info.kind.name().into(),
+        subgroup_size: info.subgroup_size,
+    }
 }
 
 /// Milliseconds since `start`.

@@ -1,14 +1,14 @@
 //! Scene → device buffers, in the layout of `shaders/shared/layout.glsl`.
 
-use super::Renderer;
-use crate::bvh::{Bvh, Quantised};
+use super::{Renderer, Tree};
+use crate::bvh::Quantised;
 use crate::error::Result;
 use crate::layout::{
     self, binding, Features, FAR, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, TILE, TRIANGLE_COLORED,
     TRIANGLE_SINGLE_SIDED, TRIANGLE_SMOOTH,
 };
 use crate::scene::{self, LightKind, Projection, Soup, View};
-use crate::vulkan::{Buffer, Memory, Usage};
+use crate::vulkan::{Access, Buffer, Commands, Memory, Usage};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -18,10 +18,8 @@ pub(super) struct Scene<'a> {
     pub scene: &'a scene::Scene,
     pub soup: &'a Soup,
     pub view: &'a View,
-    pub bvh: &'a Bvh,
+    pub tree: &'a Tree,
     pub quantised: &'a Quantised,
-    /// Origin of the device's world.
-    pub center: DVec3,
 }
 
 impl Scene<'_> {
@@ -57,7 +55,7 @@ impl Scene<'_> {
 
     /// A point in the device's world.
     fn local(&self, point: DVec3) -> Vec3 {
-        (point - self.center).as_vec3()
+        (point - self.tree.center).as_vec3()
     }
 
     /// Three texels a triangle in leaf order.
@@ -76,7 +74,7 @@ impl Scene<'_> {
             let texel = |corner: usize| with_bits(self.local(soup.positions[index][corner]), extra[corner]);
             [texel(0), texel(1), texel(2)]
         };
-        self.bvh.order.par_iter().map(triangle).collect()
+        self.tree.bvh.order.par_iter().map(triangle).collect()
     }
 
     /// Three texels a primitive; zeros where the soup has no such data.
@@ -156,4 +154,22 @@ fn material(material: &scene::Material) -> layout::Material {
 pub(super) fn frame_buffer(renderer: &Renderer, slot: u32, name: &'static str, bytes: u64) -> Result<Buffer> {
     let usage = if slot == binding::DISPATCHES { Usage::Indirect } else { Usage::Storage };
     Buffer::new(&renderer.device, name, bytes, usage, Memory::Device)
+}
+
+/// Makes a buffer that the device copies from; never empty.
+pub(super) fn staging(renderer: &Renderer, bytes: &[u8]) -> Result<Buffer> {
+    let mut buffer = Buffer::new(&renderer.device, "staging", bytes.len() as u64, Usage::Storage, Memory::Upload)?;
+    buffer.write(bytes)?;
+    Ok(buffer)
+}
+
+/// A copy of a whole buffer that the host can read.
+pub(super) fn read_back(renderer: &Renderer, buffer: &Buffer) -> Result<Buffer> {
+    let copy = Buffer::new(&renderer.device, "read back", buffer.bytes, Usage::Storage, Memory::ReadBack)?;
+    let mut commands = Commands::new(&renderer.device, 0)?;
+    commands.copy(buffer, &copy, 0, buffer.bytes);
+    // The copy: it wrote, the host reads.
+    commands.barrier(Access::Transfer, Access::HostRead);
+    commands.submit_and_wait()?;
+    Ok(copy)
 }

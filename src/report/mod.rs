@@ -1,5 +1,9 @@
 //! What a render did: counts, times, bytes; as one JSON object for machines and as text for people.
 
+mod bench;
+
+pub use bench::{Bench, BenchTree, Mismatches, Set, Spread};
+
 use serde::Serialize;
 use std::collections::BTreeMap;
 
