@@ -10,7 +10,7 @@ fn point_box(center: Vec3, half: Vec3) -> Aabb {
 
 fn check(name: &str, boxes: &[Aabb]) -> Bvh {
     let bvh = Bvh::build(boxes);
-    bvh.validate(boxes).unwrap_or_else(|fault| panic!("{name}: {fault}"));
+    bvh.validate(boxes, None).unwrap_or_else(|fault| panic!("{name}: {fault}"));
     let stats = bvh.stats();
     println!("{name}: {} boxes, {} nodes, depth {}, SAH {:.1}", boxes.len(), stats.nodes, stats.depth, stats.sah_cost);
     bvh
@@ -23,7 +23,7 @@ proptest! {
             .iter()
             .map(|(at, size)| point_box(Vec3::from_array(at.map(f32::from)), Vec3::from_array(size.map(f32::from))))
             .collect();
-        prop_assert_eq!(Bvh::build(&boxes).validate(&boxes), Ok(()));
+        prop_assert_eq!(Bvh::build(&boxes).validate(&boxes, None), Ok(()));
     }
 }
 
@@ -59,13 +59,13 @@ fn a_broken_tree_is_noticed() {
     let good = Bvh::build(&boxes);
     let mut swapped = good.clone();
     swapped.order[0] = swapped.order[1];
-    assert!(swapped.validate(&boxes).is_err());
+    assert!(swapped.validate(&boxes, None).is_err());
     let mut shrunk = good.clone();
     shrunk.nodes[0].bounds[0].hi.x -= 5.0;
-    assert!(shrunk.validate(&boxes).is_err());
+    assert!(shrunk.validate(&boxes, None).is_err());
     let mut cut = good.clone();
     cut.nodes.pop();
-    assert!(cut.validate(&boxes).is_err());
+    assert!(cut.validate(&boxes, None).is_err());
 }
 
 #[test]

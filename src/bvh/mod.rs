@@ -1,11 +1,14 @@
-//! Boxes → a binary bounding volume hierarchy over them. Knows boxes, not meshes.
+//! Boxes or triangles → a binary bounding volume hierarchy over them. Knows no meshes.
 //!
-//! [`Bvh::build`] makes the tree in f32 by the surface area heuristic; [`quantise`] turns it into the 16-byte child records
+//! [`Bvh::build`] makes the tree in f32 by the surface area heuristic, [`Bvh::over_triangles`] may also cut triangles; [`quantise`] turns it into the 16-byte child records
 //! that the kernels walk. The tree's depth is bounded, hard, by `MAX_TREE_DEPTH`: the traversal's stack relies on it.
 
 mod aabb;
-mod binned_sah;
+mod build;
+mod object_split;
 mod quantise;
+mod reference;
+mod spatial_split;
 mod stats;
 
 pub use aabb::Aabb;
@@ -13,6 +16,13 @@ pub use quantise::{quantise, Grid, Quantised};
 pub use stats::Stats;
 
 use crate::layout::{MAX_LEAF_TRIANGLES, MAX_TREE_DEPTH};
+use build::Recipe;
+use glam::Vec3;
+use rayon::prelude::*;
+use reference::Reference;
+
+/// Larger leaves appear only where nothing separates their triangles; smaller ones wherever that is cheaper.
+const LEAF: usize = 6;
 
 /// What a child is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,26 +52,73 @@ pub struct Node {
 pub struct Bvh {
     /// Inner nodes.
     pub nodes: Vec<Node>,
-    /// Primitives in leaf order.
+    /// Primitives in leaf order; one that spatial splits cut appears several times.
     pub order: Vec<u32>,
     /// Box around everything.
     pub bounds: Aabb,
 }
 
-impl Bvh {
-    /// Builds a tree over boxes by binned surface area heuristic, in parallel; the same boxes give the same tree on any
-    /// number of threads.
-    pub fn build(boxes: &[Aabb]) -> Self {
-        binned_sah::build(boxes)
+/// How much work goes into a tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quality {
+    /// Object splits only.
+    Fast,
+    /// Spatial splits where boxes overlap much, for up to 3 in 10 more references.
+    Balanced,
+    /// Spatial splits wherever they help, for up to as many references again.
+    Best,
+}
+
+impl Quality {
+    /// Lower-case name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Balanced => "balanced",
+            Self::Best => "best",
+        }
     }
 
-    /// Checks every invariant: each primitive in exactly one leaf, boxes that hold what is below them, leaf sizes, depth,
-    /// order of nodes.
+    /// Free space for references that spatial splits make, and the share of the root's area that must overlap for one.
+    fn spatial(self, count: usize) -> (usize, f32) {
+        match self {
+            Self::Fast => (0, 0.0),
+            Self::Balanced => (3 * count / 10, 1e-4),
+            Self::Best => (count, 1e-5),
+        }
+    }
+}
+
+impl Bvh {
+    /// Builds a tree over boxes, in parallel; the same boxes give the same tree on any number of threads.
+    pub fn build(boxes: &[Aabb]) -> Self {
+        let mut references: Vec<Reference> =
+            (0..).zip(boxes).map(|(primitive, bounds)| Reference::new(bounds.lo, bounds.hi, primitive)).collect();
+        let recipe = Recipe { leaf: LEAF, spatial: None };
+        build::build(&mut references, boxes.len(), recipe)
+    }
+
+    /// Builds a tree over triangles, as [`Bvh::build`]; one that is long may lie in several leaves.
+    pub fn over_triangles(triangles: &[[Vec3; 3]], quality: Quality) -> Self {
+        let count = triangles.len();
+        let (free, overlap) = quality.spatial(count);
+        let reference = |primitive: usize| match triangles.get(primitive) {
+            Some(triangle) => Reference::of_triangle(triangle, primitive as u32),
+            None => Reference::NONE,
+        };
+        let mut space: Vec<Reference> = (0..count + free).into_par_iter().map(reference).collect();
+        let spatial = (free > 0).then_some((triangles, overlap));
+        build::build(&mut space, count, Recipe { leaf: LEAF, spatial })
+    }
+
+    /// Checks every invariant: each primitive wholly in one leaf, boxes that hold what is below them, leaf sizes, depth, order
+    /// of nodes. Where `triangles` are given, a primitive may instead lie in parts in several leaves, and points all over it
+    /// must be inside their boxes.
     ///
     /// # Errors
     /// The first broken invariant, in words.
-    pub fn validate(&self, boxes: &[Aabb]) -> Result<(), String> {
-        let mut seen = vec![false; boxes.len()];
+    pub fn validate(&self, boxes: &[Aabb], triangles: Option<&[[Vec3; 3]]>) -> Result<(), String> {
+        let mut leaves_of = vec![Vec::new(); boxes.len()];
         let mut visited = 0;
         let mut stack = vec![(0_u32, self.bounds, 1_u32)];
         while let Some((index, bounds, depth)) = stack.pop() {
@@ -78,13 +135,7 @@ impl Bvh {
                     }
                     Child::Leaf { first, count } => {
                         for place in first..first + count {
-                            let primitive = self.order[place as usize] as usize;
-                            if std::mem::replace(&mut seen[primitive], true) {
-                                return Err(format!("primitive {primitive} lies in two leaves"));
-                            }
-                            if !child_bounds.contains(&boxes[primitive]) {
-                                return Err(format!("primitive {primitive} sticks out of its leaf"));
-                            }
+                            leaves_of[self.order[place as usize] as usize].push(child_bounds);
                         }
                     }
                     Child::Node(below) if below <= index => return Err(format!("node {below} lies below {index}")),
@@ -98,9 +149,30 @@ impl Bvh {
         if visited != self.nodes.len() {
             return Err(format!("{visited} of {} nodes can be reached", self.nodes.len()));
         }
-        match seen.iter().position(|seen| !seen) {
-            Some(primitive) => Err(format!("primitive {primitive} lies in no leaf")),
-            None => Ok(()),
+        for (primitive, leaves) in leaves_of.iter().enumerate() {
+            match (leaves.as_slice(), triangles) {
+                ([], _) => return Err(format!("primitive {primitive} lies in no leaf")),
+                ([leaf], _) if leaf.contains(&boxes[primitive]) => {}
+                (_, None) => return Err(format!("primitive {primitive} does not lie in one leaf")),
+                (leaves, Some(triangles)) => {
+                    let inside = |point: Vec3| leaves.iter().any(|leaf| leaf.contains(&Aabb { lo: point, hi: point }));
+                    if let Some(point) = points_of(&triangles[primitive]).find(|point| !inside(*point)) {
+                        return Err(format!("{point} of primitive {primitive} lies in none of its leaves"));
+                    }
+                }
+            }
         }
+        Ok(())
     }
+}
+
+/// Points all over a triangle, edges and corners too.
+fn points_of([a, b, c]: &[Vec3; 3]) -> impl Iterator<Item = Vec3> + '_ {
+    const STEPS: u32 = 24;
+    (0..=STEPS).flat_map(move |i| {
+        (0..=STEPS - i).map(move |j| {
+            let (u, v) = (i as f32 / STEPS as f32, j as f32 / STEPS as f32);
+            *a * (1.0 - u - v) + *b * u + *c * v
+        })
+    })
 }

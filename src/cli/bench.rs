@@ -1,14 +1,15 @@
 //! `glimt bench`.
 
+use super::values::BvhChoice;
 use super::{load_scene, milliseconds, set_threads, Context, Outcome};
 use clap::{Args, ValueEnum, ValueHint};
+use glam::{DVec3, Vec3};
 use glimt::render::ray_sets::{BenchRay, BenchView, PrimaryHit, SetKind};
 use glimt::render::{describe_device, Met, Prepared, Renderer, Trace, Tracer, Tree};
 use glimt::report::{Bench, BenchTree, Mismatches, Set, Spread};
 use glimt::scene::{Camera, LightKind, Projection};
 use glimt::vulkan::DeviceChoice;
 use glimt::{reference, Error, Options, Result, Scene};
-use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -34,6 +35,9 @@ pub struct BenchArgs {
     /// Trace the rays of DIR/NAME.SET.rays and count answers that differ from DIR/NAME.SET.ref
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, conflicts_with = "export")]
     compare: Option<PathBuf>,
+    /// How much work goes into the tree
+    #[arg(long, value_enum, default_value_t = BvhChoice::Best)]
+    bvh: BvhChoice,
     /// Device by index or part of its name [default: the best]
     #[arg(long, value_name = "NAME|INDEX")]
     device: Option<String>,
@@ -87,10 +91,10 @@ impl BenchArgs {
         let mut tree = None;
         for _ in 0..BUILDS {
             let start = Instant::now();
-            tree = Some(Tree::build(&prepared.soup));
+            tree = Some(Tree::build(&prepared.soup, self.bvh.into()));
             build_ms.push(milliseconds(start));
         }
-        let tree = tree.unwrap_or_else(|| Tree::build(&prepared.soup));
+        let tree = tree.unwrap_or_else(|| Tree::build(&prepared.soup, self.bvh.into()));
         let tracer = renderer.tracer(&scene, &prepared, &tree)?;
         let mut files = Files::of(&self, &scene.name, &view);
         let sets = self.trace(&tracer, &prepared, &view, &options, &mut files)?;
@@ -104,7 +108,7 @@ impl BenchArgs {
             triangles: prepared.soup.len(),
             sets,
             bvh: BenchTree {
-                builder: "binned SAH",
+                builder: tree.quality.name(),
                 build_ms: Spread::of(build_ms).median,
                 nodes: stats.nodes,
                 bytes: 32 * stats.nodes as u64,
@@ -179,7 +183,11 @@ impl BenchArgs {
             }
             let pixels: Vec<u32> = order.iter().copied().filter(|pixel| rays[*pixel as usize].t_max >= 0.0).collect();
             let active: Vec<BenchRay> = pixels.iter().map(|pixel| rays[*pixel as usize]).collect();
-            let traced = if kind == SetKind::Primary { trace.clone() } else { tracer.trace(kind, &active, runs(kind), options)? };
+            let traced = if kind == SetKind::Primary {
+                trace.clone()
+            } else {
+                tracer.trace(kind, &active, runs(kind), options)?
+            };
             let answers: Vec<f32> = traced.met.iter().map(answer).collect();
             let mismatches = files.compare(kind, prepared, &pixels, &active, &answers)?;
             sets.push(described(kind, &traced, mismatches));

@@ -40,7 +40,7 @@ impl ExplainArgs {
         let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
         let options = self.view.options()?;
         let Prepared { soup, view, features } = Prepared::new(&scene, &options)?;
-        let nodes = Tree::build(&soup).bvh.nodes.len();
+        let nodes = Tree::build(&soup, options.quality(soup.len())).bvh.nodes.len();
         let plan = Plan::new(&scene, &soup, &view, features, nodes, options.samples_in_flight);
         match if self.json { Form::Json } else { self.format } {
             Form::Text => Ok(Outcome::text(text(&plan, &scene.name, view.samples))),

@@ -96,7 +96,7 @@ impl RenderArgs {
             let (scene, prepared) = self.load(options)?;
             let load = milliseconds(start);
             let start = Instant::now();
-            let tree = Tree::build(&prepared.soup);
+            let tree = Tree::build(&prepared.soup, options.quality(prepared.soup.len()));
             let bvh_ms = milliseconds(start);
             stop_if_interrupted(options)?;
             let renderer = device.join().map_err(|_| Error::Device("opening it failed".into()))??;

@@ -1,6 +1,29 @@
 //! Values of flags.
 
+use clap::ValueEnum;
 use glam::DVec3;
+use glimt::bvh::Quality;
+
+/// How much work goes into the tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BvhChoice {
+    /// Object splits only
+    Fast,
+    /// Spatial splits where boxes overlap much
+    Balanced,
+    /// Spatial splits wherever they help
+    Best,
+}
+
+impl From<BvhChoice> for Quality {
+    fn from(choice: BvhChoice) -> Self {
+        match choice {
+            BvhChoice::Fast => Self::Fast,
+            BvhChoice::Balanced => Self::Balanced,
+            BvhChoice::Best => Self::Best,
+        }
+    }
+}
 
 /// `WxH`, pixels.
 pub fn size(text: &str) -> Result<(u32, u32), String> {

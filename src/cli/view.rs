@@ -1,6 +1,6 @@
 //! Flags that choose the picture, the same for every command that renders.
 
-use super::values::{size, vector};
+use super::values::{size, vector, BvhChoice};
 use clap::Args;
 use glam::DVec3;
 use glimt::scene::{Background, CameraChoice};
@@ -48,6 +48,9 @@ pub struct ViewArgs {
     /// Pixel samples traced at once: bounds the memory, changes no pixel
     #[arg(long, value_name = "N", default_value_t = 1 << 18)]
     samples_in_flight: u32,
+    /// How much work goes into the tree; changes no pixel [default: by the numbers of triangles and rays]
+    #[arg(long, value_enum)]
+    bvh: Option<BvhChoice>,
     /// Compile and run everything, needed or not
     #[arg(long, hide = true)]
     all_features: bool,
@@ -84,6 +87,7 @@ impl ViewArgs {
             background: self.background,
             default_light: !self.no_default_light,
             samples_in_flight: self.samples_in_flight,
+            bvh: self.bvh.map(Into::into),
             all_features: self.all_features,
             ..Options::default()
         })

@@ -6,7 +6,7 @@ mod write;
 
 pub use metrics::{compare, heat_map, Metrics};
 pub use read::read;
-pub use write::{write_whole, check_writable, Format, Saved};
+pub use write::{check_writable, write_whole, Format, Saved};
 
 /// Linear pixels, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]

@@ -151,7 +151,7 @@ impl Renderer {
     /// As [`render`].
     pub fn render_prepared(&self, scene: &Scene, prepared: &Prepared, options: &Options) -> Result<(Film, Report)> {
         let start = Instant::now();
-        let tree = Tree::build(&prepared.soup);
+        let tree = Tree::build(&prepared.soup, options.quality(prepared.soup.len()));
         let bvh_ms = milliseconds(start);
         self.render_with_tree(scene, prepared, options, &tree).map(|(film, mut report)| {
             report.times_ms.bvh = bvh_ms;

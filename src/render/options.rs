@@ -1,5 +1,6 @@
 //! What a caller may choose.
 
+use crate::bvh::Quality;
 use crate::error::Result;
 use crate::scene::{Background, CameraChoice, Scene, Soup, View};
 use crate::vulkan::DeviceChoice;
@@ -35,6 +36,8 @@ pub struct Options {
     pub validate: bool,
     /// Pixel samples traced at once: bounds the queues' memory, changes no pixel. Default 2¹⁸.
     pub samples_in_flight: u32,
+    /// How much work goes into the tree; `None`: as much as the rays will save. Changes no pixel.
+    pub bvh: Option<Quality>,
     /// Every feature on, needed or not: slower, the same picture. For tests.
     pub all_features: bool,
     /// Progress.
@@ -57,6 +60,7 @@ impl Default for Options {
             device: DeviceChoice::Best,
             validate: false,
             samples_in_flight: 1 << 18,
+            bvh: None,
             all_features: false,
             progress: None,
             interrupted: Arc::default(),
@@ -65,6 +69,16 @@ impl Default for Options {
 }
 
 impl Options {
+    /// The quality of the tree over so many triangles.
+    pub fn quality(&self, triangles: usize) -> Quality {
+        let rays = u64::from(self.size.0) * u64::from(self.size.1) * u64::from(self.samples);
+        self.bvh.unwrap_or(match rays / (triangles as u64).max(1) {
+            0..2 => Quality::Fast,
+            2..8 => Quality::Balanced,
+            _ => Quality::Best,
+        })
+    }
+
     /// The view of `scene`, whose triangles are `soup`, that these options mean.
     ///
     /// # Errors

@@ -168,11 +168,7 @@ fn scattered(normal: Vec3, pixel: u32) -> Vec3 {
     let b = normal.x * normal.y * a;
     let tangent = Vec3::new(1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x);
     let bitangent = Vec3::new(b, sign + normal.y * normal.y * a, -normal.y);
-    unit(
-        tangent * (radius * angle.cos())
-            + bitangent * (radius * angle.sin())
-            + normal * (1.0 - u_1).max(0.0).sqrt(),
-    )
+    unit(tangent * (radius * angle.cos()) + bitangent * (radius * angle.sin()) + normal * (1.0 - u_1).max(0.0).sqrt())
 }
 
 /// PCG-RXS-M-XS of one word (O'Neill 2014).

@@ -7,7 +7,8 @@ use super::{upload, Options, Plan, Renderer};
 use crate::bvh::quantise;
 use crate::error::{Error, Result};
 use crate::layout::{
-    binding, Features, HitItem, ReflectionItem, ShadowItem, Step, COUNTERS, COUNTER_FILLING, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW, WORKGROUP,
+    binding, Features, HitItem, ReflectionItem, ShadowItem, Step, COUNTERS, COUNTER_FILLING, QUEUE_HIT,
+    QUEUE_REFLECTION, QUEUE_SHADOW, WORKGROUP,
 };
 use crate::scene::{Scene, View};
 use crate::vulkan::{Access, Commands};
@@ -53,7 +54,12 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`super::render`].
-    pub fn tracer<'a>(&'a self, scene: &'a Scene, prepared: &'a super::Prepared, tree: &'a super::Tree) -> Result<Tracer<'a>> {
+    pub fn tracer<'a>(
+        &'a self,
+        scene: &'a Scene,
+        prepared: &'a super::Prepared,
+        tree: &'a super::Tree,
+    ) -> Result<Tracer<'a>> {
         let View { width, height, .. } = prepared.view;
         let features = Features { shadows: true, reflections: true, ..Features::default() };
         let plan = Plan::new(scene, &prepared.soup, &prepared.view, features, tree.bvh.nodes.len(), width * height);

@@ -1,8 +1,8 @@
 //! A soup's tree in the device's world.
 
-use crate::bvh::{Aabb, Bvh};
+use crate::bvh::{Bvh, Quality};
 use crate::scene::Soup;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// A tree over a soup.
@@ -11,14 +11,16 @@ pub struct Tree {
     pub bvh: Bvh,
     /// Origin of the device's world, in world space: the soup's centre.
     pub center: DVec3,
+    /// How it was built.
+    pub quality: Quality,
 }
 
 impl Tree {
     /// Builds the tree over a soup.
-    pub fn build(soup: &Soup) -> Self {
+    pub fn build(soup: &Soup, quality: Quality) -> Self {
         let center = soup.center();
-        let corners = |corners: &[DVec3; 3]| Aabb::of(corners.map(|corner| (corner - center).as_vec3()));
-        let boxes: Vec<Aabb> = soup.positions.par_iter().map(corners).collect();
-        Self { bvh: Bvh::build(&boxes), center }
+        let local = |corners: &[DVec3; 3]| corners.map(|corner| (corner - center).as_vec3());
+        let triangles: Vec<[Vec3; 3]> = soup.positions.par_iter().map(local).collect();
+        Self { bvh: Bvh::over_triangles(&triangles, quality), center, quality }
     }
 }

@@ -110,7 +110,14 @@ impl Bench {
             let speed = set.mrays_per_s;
             let mut line = format!(
                 "{:<10}{:>9}{:>9}{:>12.3}{:>9.3}{:>9.3}{:>12.2}{:>10.2}",
-                set.name, set.rays, set.hits, speed.median, speed.min, speed.max, set.device_ms.median, set.wall_ms.median
+                set.name,
+                set.rays,
+                set.hits,
+                speed.median,
+                speed.min,
+                speed.max,
+                set.device_ms.median,
+                set.wall_ms.median
             );
             if let Some(Mismatches { count, missed, extra, wrong }) = set.mismatches {
                 line += &format!("  mismatches {count} ({missed} missed, {extra} extra), wrong {wrong}");

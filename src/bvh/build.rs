@@ -1,0 +1,188 @@
+//! Top-down building: each node is split where the surface area heuristic expects the cheapest rays, until leaves are small.
+//!
+//! The references of a subtree lie at the front of a piece of one array; the free space behind them is what spatial splits may
+//! fill, and is handed down in proportion, so that every subtree knows its budget and the tree is the same on any number of
+//! threads.
+
+use super::reference::{bounds_of, Box4, Reference};
+use super::{object_split, spatial_split, Bvh, Child, Node};
+use crate::layout::MAX_TREE_DEPTH;
+use glam::Vec3;
+
+/// Cost of visiting a node, in triangle tests.
+pub(super) const VISIT_COST: f32 = 1.2;
+/// Below this many references a subtree is built by one thread.
+const PARALLEL: usize = 4096;
+
+/// What kind of tree to build.
+#[derive(Clone, Copy)]
+pub(super) struct Recipe<'a> {
+    /// Most references in a leaf that a split could separate.
+    pub leaf: usize,
+    /// Corners, for spatial splits, with the share of the root's area that children must overlap before one is tried.
+    pub spatial: Option<(&'a [[Vec3; 3]], f32)>,
+}
+
+struct Builder<'a> {
+    recipe: Recipe<'a>,
+    /// Half the area of the root.
+    whole: f32,
+}
+
+/// Builds over the first `count` references of `space`.
+pub(super) fn build(space: &mut [Reference], count: usize, recipe: Recipe) -> Bvh {
+    let (bounds, _) = bounds_of(&space[..count]);
+    let builder = Builder { recipe, whole: bounds.half_area() };
+    let mut nodes = Vec::new();
+    let (bounds, root) = builder.subtree(space, count, 0, 1, &mut nodes);
+    if nodes.is_empty() {
+        // The root is always a node, so that traversal needs no special case for small scenes.
+        nodes.push(Node { bounds: [bounds.aabb(); 2], children: [root, Child::Leaf { first: 0, count: 0 }] });
+    }
+    // Leaves were numbered by their place in the space; now the gaps between them are closed.
+    let mut order = Vec::with_capacity(count);
+    for node in &mut nodes {
+        for child in &mut node.children {
+            if let Child::Leaf { first, count } = child {
+                let place = *first as usize;
+                *first = order.len() as u32;
+                order.extend(space[place..][..*count as usize].iter().map(Reference::primitive));
+            }
+        }
+    }
+    Bvh { nodes, order, bounds: bounds.aabb() }
+}
+
+impl Builder<'_> {
+    /// Builds the subtree over the first `count` references of `space`, whose place in the whole is `first`, and appends
+    /// its nodes.
+    fn subtree(
+        &self,
+        space: &mut [Reference],
+        count: usize,
+        first: usize,
+        depth: u32,
+        nodes: &mut Vec<Node>,
+    ) -> (Box4, Child) {
+        let (bounds, centers) = bounds_of(&space[..count]);
+        let Some((left_count, count)) = self.split(space, count, &bounds, &centers, depth) else {
+            return (bounds, Child::Leaf { first: first as u32, count: count as u32 });
+        };
+        let right_count = count - left_count;
+        // The right side's references move behind the left side's free space.
+        let left_free = left_share(&space[..count], left_count, space.len() - count);
+        let moved = left_free.min(right_count);
+        space.copy_within(left_count..left_count + moved, left_count + left_free + right_count - moved);
+        let middle = left_count + left_free;
+        let (left, right) = space.split_at_mut(middle);
+        let own = nodes.len();
+        nodes.push(Node { bounds: [bounds.aabb(); 2], children: [Child::Leaf { first: 0, count: 0 }; 2] });
+        let (left, right) = if count > PARALLEL {
+            // The right half is numbered from 0 until it is known how many nodes the left half has.
+            let mut right_nodes = Vec::new();
+            let (left, right) = rayon::join(
+                || self.subtree(left, left_count, first, depth + 1, nodes),
+                || self.subtree(right, right_count, first + middle, depth + 1, &mut right_nodes),
+            );
+            let at = nodes.len() as u32;
+            nodes.extend(
+                right_nodes
+                    .into_iter()
+                    .map(|node| Node { children: node.children.map(|child| renumbered(child, at)), ..node }),
+            );
+            (left, (right.0, renumbered(right.1, at)))
+        } else {
+            (
+                self.subtree(left, left_count, first, depth + 1, nodes),
+                self.subtree(right, right_count, first + middle, depth + 1, nodes),
+            )
+        };
+        nodes[own] = Node { bounds: [left.0.aabb(), right.0.aabb()], children: [left.1, right.1] };
+        (bounds, Child::Node(own as u32))
+    }
+
+    /// Partitions the first `count` references and returns how many go left and how many there are now, or `None` for a
+    /// leaf.
+    fn split(
+        &self,
+        space: &mut [Reference],
+        count: usize,
+        bounds: &Box4,
+        centers: &Box4,
+        depth: u32,
+    ) -> Option<(usize, usize)> {
+        let leaf = self.recipe.leaf;
+        if count <= 1 {
+            return None;
+        }
+        // Halving from here on would just fit: no more choice.
+        let levels_needed = |count: usize| usize::BITS - (count - 1).leading_zeros();
+        if depth + levels_needed(count) >= MAX_TREE_DEPTH {
+            return (count > leaf).then(|| (halve(&mut space[..count], centers), count));
+        }
+        let references = &space[..count];
+        let object = object_split::cheapest(references, centers);
+        let spatial = self.recipe.spatial.and_then(|(triangles, overlap)| {
+            let worthwhile = object.is_none_or(|object| object.overlap > overlap * self.whole)
+                && space.len() > count
+                && depth + levels_needed(space.len()) < MAX_TREE_DEPTH;
+            let split = worthwhile.then(|| spatial_split::cheapest(references, bounds, triangles)).flatten()?;
+            let best_object = object.map_or(f32::INFINITY, |object| object.cost);
+            (split.cost < best_object && split.cut <= space.len() - count).then_some((split, triangles))
+        });
+        let split_cost = spatial.map(|(split, _)| split.cost).or(object.map(|object| object.cost));
+        let split_cost = split_cost.map(|cost| VISIT_COST + cost / bounds.half_area().max(f32::MIN_POSITIVE));
+        if count <= leaf && split_cost.is_none_or(|cost| count as f32 <= cost) {
+            return None;
+        }
+        if let Some((split, triangles)) = spatial {
+            let (left, total) = split.partition(space, count, triangles);
+            // Rounding may have put all on one side.
+            if left > 0 && left < total {
+                return Some((left, total));
+            }
+        }
+        let references = &mut space[..count];
+        let left = object.map_or(0, |object| object.partition(references));
+        Some((if left == 0 || left == count { halve(references, centers) } else { left }, count))
+    }
+}
+
+/// How much of the free space the left side gets: in proportion to what splits of space could save on each side.
+fn left_share(references: &[Reference], left_count: usize, free: usize) -> usize {
+    if free == 0 {
+        return 0;
+    }
+    let empty = |references: &[Reference]| references.iter().map(Reference::empty_area).sum::<f32>();
+    let (left, right) = references.split_at(left_count);
+    let (left, right) = (empty(left), empty(right));
+    if left + right > 0.0 {
+        (free as f32 * (left / (left + right))) as usize
+    } else {
+        0
+    }
+}
+
+/// Halves by the centres along their longest axis.
+fn halve(references: &mut [Reference], centers: &Box4) -> usize {
+    let size = centers.hi - centers.lo;
+    let axis = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    let middle = references.len() / 2;
+    let key = |reference: &Reference| reference.doubled_center()[axis];
+    references.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)).then(a.primitive().cmp(&b.primitive())));
+    middle
+}
+
+/// The child with its node's number moved by `at`.
+fn renumbered(child: Child, at: u32) -> Child {
+    match child {
+        Child::Node(index) => Child::Node(index + at),
+        leaf => leaf,
+    }
+}

@@ -1,0 +1,168 @@
+//! Splits that give each reference to one side, by the surface area heuristic: over bins along each axis (Wald, On fast
+//! construction of SAH-based bounding volume hierarchies, RT 2007), or over every place between few sorted references.
+
+use super::reference::{Box4, Reference};
+use glam::Vec4;
+
+/// Most bins along an axis; fewer where there are few references.
+const BINS: usize = 32;
+/// Up to this many references every place is tried.
+const SWEEP: usize = 12;
+
+/// A split and what it costs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ObjectSplit {
+    /// Σ half area · references, of both sides.
+    pub cost: f32,
+    /// Half area of what both sides cover.
+    pub overlap: f32,
+    axis: usize,
+    place: Place,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    /// The first so many in order of their centres go left.
+    Sorted(usize),
+    /// Bins up to `last_left` go left.
+    Binned { binning: Binning, last_left: usize },
+}
+
+/// Bin of a reference along each axis: (doubled centre − origin) · scale.
+#[derive(Clone, Copy, Debug)]
+struct Binning {
+    origin: Vec4,
+    scale: Vec4,
+    bins: usize,
+}
+
+impl Binning {
+    fn over(centers: &Box4, count: usize) -> Self {
+        let bins = (4 + count / 16).min(BINS);
+        let size = centers.hi - centers.lo;
+        // The outer bins are half as wide as the others; 0 where the axis has no extent.
+        let scale = Vec4::splat((bins - 1) as f32) / size;
+        let scale = Vec4::select(scale.is_finite_mask() & size.cmpgt(Vec4::ZERO), scale, Vec4::ZERO);
+        Self { origin: centers.lo, scale, bins }
+    }
+
+    fn bins_of(&self, reference: &Reference) -> [usize; 3] {
+        // Adding 2²³ rounds to a whole number and leaves it in the mantissa: cheaper than a checked conversion.
+        let place = (reference.doubled_center() - self.origin) * self.scale + Vec4::splat(8_388_608.0);
+        [place.x, place.y, place.z].map(|bin| ((bin.to_bits() & 0xff) as usize).min(self.bins - 1))
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Bin {
+    bounds: Box4,
+    count: usize,
+}
+
+impl Bin {
+    const EMPTY: Self = Self { bounds: Box4::EMPTY, count: 0 };
+
+    fn union(&self, other: &Self) -> Self {
+        Self { bounds: self.bounds.union(&other.bounds), count: self.count + other.count }
+    }
+
+    fn cost(&self) -> f32 {
+        self.bounds.half_area() * self.count as f32
+    }
+}
+
+/// The cheapest split of at least two references, `None` when their centres coincide.
+pub(super) fn cheapest(references: &[Reference], centers: &Box4) -> Option<ObjectSplit> {
+    if references.len() <= SWEEP {
+        sweep(references)
+    } else {
+        binned(references, centers)
+    }
+}
+
+impl ObjectSplit {
+    /// Moves what goes left to the front and returns how much that is; the order is a function of the references alone.
+    pub fn partition(&self, references: &mut [Reference]) -> usize {
+        match self.place {
+            Place::Sorted(left) => {
+                sort(references, self.axis);
+                left
+            }
+            Place::Binned { binning, last_left } => {
+                let (mut left, mut right) = (0, references.len());
+                while left < right {
+                    if binning.bins_of(&references[left])[self.axis] <= last_left {
+                        left += 1;
+                    } else {
+                        right -= 1;
+                        references.swap(left, right);
+                    }
+                }
+                left
+            }
+        }
+    }
+}
+
+fn sort(references: &mut [Reference], axis: usize) {
+    let key = |reference: &Reference| reference.doubled_center()[axis];
+    references.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.primitive().cmp(&b.primitive())));
+}
+
+fn sweep(references: &[Reference]) -> Option<ObjectSplit> {
+    let count = references.len();
+    let mut sorted = [Reference::NONE; SWEEP];
+    let sorted = &mut sorted[..count];
+    sorted.copy_from_slice(references);
+    let mut best: Option<ObjectSplit> = None;
+    for axis in 0..3 {
+        sort(sorted, axis);
+        let mut right = [Box4::EMPTY; SWEEP];
+        let mut side = Box4::EMPTY;
+        for index in (1..count).rev() {
+            side = side.union(&sorted[index].bounds());
+            right[index] = side;
+        }
+        let mut left = Box4::EMPTY;
+        for index in 1..count {
+            left = left.union(&sorted[index - 1].bounds());
+            let cost = left.half_area() * index as f32 + right[index].half_area() * (count - index) as f32;
+            if best.is_none_or(|best| cost < best.cost) {
+                let overlap = left.intersection(&right[index]).half_area();
+                best = Some(ObjectSplit { cost, overlap, axis, place: Place::Sorted(index) });
+            }
+        }
+    }
+    best
+}
+
+fn binned(references: &[Reference], centers: &Box4) -> Option<ObjectSplit> {
+    let binning = Binning::over(centers, references.len());
+    let mut bins = [[Bin::EMPTY; BINS]; 3];
+    for reference in references {
+        let bounds = reference.bounds();
+        for (axis, bin) in binning.bins_of(reference).into_iter().enumerate() {
+            let bin = &mut bins[axis][bin];
+            bin.bounds = bin.bounds.union(&bounds);
+            bin.count += 1;
+        }
+    }
+    let mut best: Option<ObjectSplit> = None;
+    for (axis, bins) in bins.iter().enumerate().filter(|(axis, _)| binning.scale[*axis] > 0.0) {
+        let mut right = [Bin::EMPTY; BINS];
+        for index in (1..binning.bins).rev() {
+            right[index - 1] = right[index].union(&bins[index]);
+        }
+        let mut left = Bin::EMPTY;
+        for index in 0..binning.bins - 1 {
+            left = left.union(&bins[index]);
+            let cost = left.cost() + right[index].cost();
+            let separates = left.count > 0 && right[index].count > 0;
+            if separates && best.is_none_or(|best| cost < best.cost) {
+                let overlap = left.bounds.intersection(&right[index].bounds).half_area();
+                best = Some(ObjectSplit { cost, overlap, axis, place: Place::Binned { binning, last_left: index } });
+            }
+        }
+    }
+    best
+}

@@ -1,0 +1,95 @@
+//! What the builder sorts into leaves: a primitive, or a part of one, and its box.
+
+use super::Aabb;
+use glam::{Vec3, Vec4};
+
+/// A box in SIMD registers, the fourth lane meaning nothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Box4 {
+    pub lo: Vec4,
+    pub hi: Vec4,
+}
+
+impl Box4 {
+    pub const EMPTY: Self = Self { lo: Vec4::INFINITY, hi: Vec4::NEG_INFINITY };
+
+    pub fn union(&self, other: &Self) -> Self {
+        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    }
+
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self { lo: self.lo.max(other.lo), hi: self.hi.min(other.hi) }
+    }
+
+    pub fn with_point(&self, point: Vec4) -> Self {
+        Self { lo: self.lo.min(point), hi: self.hi.max(point) }
+    }
+
+    /// Half the surface; 0 when empty.
+    pub fn half_area(&self) -> f32 {
+        let size = (self.hi - self.lo).max(Vec4::ZERO);
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.lo.truncate().cmpgt(self.hi.truncate()).any()
+    }
+
+    pub fn aabb(&self) -> Aabb {
+        Aabb { lo: self.lo.truncate(), hi: self.hi.truncate() }
+    }
+}
+
+/// A reference: 32 bytes, the primitive's number and its emptiness in the lanes that the box does not need.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reference {
+    lo: Vec4,
+    hi: Vec4,
+}
+
+impl Reference {
+    pub const NONE: Self = Self { lo: Vec4::ZERO, hi: Vec4::ZERO };
+
+    pub fn new(lo: Vec3, hi: Vec3, primitive: u32) -> Self {
+        Self { lo: lo.extend(f32::from_bits(primitive)), hi: hi.extend(0.0) }
+    }
+
+    /// A triangle. Its emptiness is the share of its box's surface that it does not fill, seen along the axes.
+    pub fn of_triangle([a, b, c]: &[Vec3; 3], primitive: u32) -> Self {
+        let mut reference = Self::new(a.min(*b).min(*c), a.max(*b).max(*c), primitive);
+        let filled = (*b - *a).cross(*c - *a).abs().element_sum();
+        let box_area = reference.bounds().half_area();
+        reference.hi.w = if box_area > 0.0 { (1.0 - filled / box_area).clamp(0.0, 1.0) } else { 0.0 };
+        reference
+    }
+
+    /// The same primitive with another box.
+    pub fn with_bounds(&self, bounds: &Box4) -> Self {
+        Self { lo: bounds.lo.truncate().extend(self.lo.w), hi: bounds.hi.truncate().extend(self.hi.w) }
+    }
+
+    /// Empty surface of the box: what splits of space could save.
+    pub fn empty_area(&self) -> f32 {
+        self.bounds().half_area() * self.hi.w
+    }
+
+    pub fn primitive(&self) -> u32 {
+        self.lo.w.to_bits()
+    }
+
+    pub fn bounds(&self) -> Box4 {
+        Box4 { lo: self.lo, hi: self.hi }
+    }
+
+    /// Twice the centre: enough to compare, and exact where the centre would round.
+    pub fn doubled_center(&self) -> Vec4 {
+        self.lo + self.hi
+    }
+}
+
+/// The box around references, and the box around their doubled centres.
+pub(super) fn bounds_of(references: &[Reference]) -> (Box4, Box4) {
+    references.iter().fold((Box4::EMPTY, Box4::EMPTY), |(bounds, centers), reference| {
+        (bounds.union(&reference.bounds()), centers.with_point(reference.doubled_center()))
+    })
+}
