@@ -26,7 +26,13 @@ Ray camera_ray(vec2 point) {
 /// One thread a pixel sample: camera ray → nearest hit → hit queue, or background.
 void main() {
     uint sample_index = interleaved_workgroup() * WORKGROUP + gl_LocalInvocationIndex;
-    uint pixel = sample_index / step_now.samples;
+    uint pixel = sample_index;
+    uint sample_of_wave = 0u;
+    if (MULTISAMPLING) {
+        uvec2 divided = divide(sample_index, step_now.samples);
+        pixel = divided.x;
+        sample_of_wave = divided.y;
+    }
     if (pixel >= step_now.pixels)
         return;
     uvec2 place = pixel_place(step_now.first_pixel + pixel);
@@ -34,7 +40,7 @@ void main() {
         return;
     vec2 inside = vec2(0.5);
     if (MULTISAMPLING && frame.samples > 1u)
-        inside = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_index % step_now.samples);
+        inside = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_of_wave);
 
     Ray ray = camera_ray(vec2(place) + inside);
     Hit hit = nearest_hit(ray);

@@ -1,4 +1,5 @@
 // Pixels are numbered tile by tile so that neighbours in a workgroup are neighbours in the picture.
+#include "divide.glsl"
 
 /// Every second bit of the lower six, packed: undoes the Morton interleave of a tile.
 uint even_bits(uint code) {
@@ -9,5 +10,5 @@ uint even_bits(uint code) {
 uvec2 pixel_place(uint pixel) {
     uint tile = pixel / (TILE * TILE);
     uint code = pixel % (TILE * TILE);
-    return TILE * uvec2(tile % frame.tiles_across, tile / frame.tiles_across) + uvec2(even_bits(code), even_bits(code >> 1u));
+    return TILE * divide(tile, frame.tiles_across).yx + uvec2(even_bits(code), even_bits(code >> 1u));
 }
