@@ -23,9 +23,14 @@ Ray camera_ray(vec2 point) {
                                     : Ray(frame.eye, normalize(frame.forward + offset));
 }
 
+/// The pixel sample of this thread.
+uint own_sample() {
+    return RETRACE ? queue_item(QUEUE_RETRACE) : interleaved_workgroup() * WORKGROUP + gl_LocalInvocationIndex;
+}
+
 /// One thread a pixel sample: camera ray → nearest hit → hit queue, or background.
 void main() {
-    uint sample_index = interleaved_workgroup() * WORKGROUP + gl_LocalInvocationIndex;
+    uint sample_index = own_sample();
     uint pixel = sample_index;
     uint sample_of_wave = 0u;
     if (MULTISAMPLING) {
@@ -43,11 +48,13 @@ void main() {
         inside = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_of_wave);
 
     Ray ray = camera_ray(vec2(place) + inside);
-    Hit hit = nearest_hit(ray);
-    if (hit.triangle == NO_TRIANGLE) {
-        radiance[sample_index] = vec4(background(ray.direction), frame.background_alpha);
+    Hit hit = no_hit(FAR);
+    if (!traverse(ray, false, hit)) {
+        retrace_queue[queue_append(QUEUE_RETRACE)] = sample_index;
         return;
     }
-    radiance[sample_index] = vec4(0.0, 0.0, 0.0, 1.0);
-    hit_queue[queue_append(QUEUE_HIT)] = HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, vec3(1.0));
+    bool is_hit = hit.triangle != NO_TRIANGLE;
+    radiance[sample_index] = is_hit ? vec4(0.0, 0.0, 0.0, 1.0) : vec4(background(ray.direction), frame.background_alpha);
+    if (is_hit)
+        hit_queue[queue_append(QUEUE_HIT)] = HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, 0u);
 }

@@ -1,21 +1,27 @@
 #version 460
 #include "shared/kernel.glsl"
 #include "shared/queue.glsl"
+#include "shared/texels.glsl"
 #include "shared/intersect.glsl"
 #include "shared/traverse.glsl"
 #include "shared/light.glsl"
 
 /// One thread a reflected ray: nearest hit → hit queue, or background.
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= queue_items(QUEUE_REFLECTION))
+    uint index = queue_item(QUEUE_REFLECTION);
+    if (index == NO_ITEM)
         return;
-    ReflectionItem item = reflection_queue[index];
-    Hit hit = nearest_hit(Ray(item.origin, item.direction));
-    if (hit.triangle == NO_TRIANGLE) {
-        add_radiance(item.sample_index, item.throughput * background(item.direction));
+    RayItem item = ray_item(FETCH(reflection_items, index * ITEM_TEXELS), FETCH(reflection_items, index * ITEM_TEXELS + 1u));
+    Hit hit = no_hit(item.distance);
+    if (!traverse(Ray(item.origin, item.direction), false, hit)) {
+        retrace_queue[queue_append(QUEUE_RETRACE)] = index;
         return;
     }
-    hit_queue[queue_append(QUEUE_HIT)] =
-        HitItem(item.sample_index, hit.triangle, hit.barycentrics, item.direction, item.throughput);
+    if (hit.triangle != NO_TRIANGLE) {
+        hit_queue[queue_append(QUEUE_HIT)] =
+            HitItem(item.sample_index, hit.triangle, hit.barycentrics, item.direction, 0u);
+    } else {
+        vec3 factor = FETCH_FLOATS(throughputs, item.sample_index).rgb;
+        add_radiance(item.sample_index, factor * background(item.direction));
+    }
 }

@@ -6,7 +6,9 @@
 /// the waves, so that the sum is always the same; at the end it becomes the mean.
 void main() {
     uint pixel = gl_GlobalInvocationID.x;
-    if (pixel >= step_now.pixels)
+    // Rays that nobody has traced again: the host runs the wave once more.
+    bool is_incomplete = counters[COUNTER_FILLING + QUEUE_RETRACE] != 0u;
+    if (pixel >= step_now.pixels || is_incomplete)
         return;
     uvec2 place = pixel_place(step_now.first_pixel + pixel);
     if (place.x >= frame.width || place.y >= frame.height)

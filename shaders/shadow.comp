@@ -1,15 +1,21 @@
 #version 460
 #include "shared/kernel.glsl"
 #include "shared/queue.glsl"
+#include "shared/texels.glsl"
 #include "shared/intersect.glsl"
 #include "shared/traverse.glsl"
 
-/// One thread a shadow item: if nothing blocks the light, it is added to the item's sample.
+/// One thread a shadow ray: if nothing blocks the light, what it carries is added to its sample.
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= queue_items(QUEUE_SHADOW))
+    uint index = queue_item(QUEUE_SHADOW);
+    if (index == NO_ITEM)
         return;
-    ShadowItem item = shadow_queue[index];
-    if (!any_hit(Ray(item.origin, item.direction), item.distance))
-        add_radiance(item.sample_index, item.radiance);
+    RayItem item = ray_item(FETCH(shadow_items, index * ITEM_TEXELS), FETCH(shadow_items, index * ITEM_TEXELS + 1u));
+    Hit hit = no_hit(item.distance);
+    if (!traverse(Ray(item.origin, item.direction), true, hit)) {
+        retrace_queue[queue_append(QUEUE_RETRACE)] = index;
+        return;
+    }
+    if (hit.triangle == NO_TRIANGLE)
+        add_radiance(item.sample_index, FETCH_FLOATS(shadow_radiances, item.sample_index).rgb);
 }

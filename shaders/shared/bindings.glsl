@@ -1,6 +1,7 @@
 // Every buffer that a kernel can see, once; build.rs makes the descriptor set layout from these lines.
 // A FETCH buffer holds uvec4 texels read through FETCH(name, i): a uniform texel buffer, which software Vulkan reads 1.5 to
 // 1.9 times faster, or a storage buffer where the device's texel buffers are too small. A kernel is compiled for both.
+// A FETCH_VIEW shows a storage buffer that an earlier pass wrote in the same way.
 #ifdef FETCH_FROM_STORAGE
 #define FETCH_BUFFER(slot, name) layout(set = 0, binding = slot, std430) readonly buffer name##_block { uvec4 name[]; };
 #define FETCH(name, index) name[index]
@@ -8,6 +9,7 @@
 #define FETCH_BUFFER(slot, name) layout(set = 0, binding = slot) uniform usamplerBuffer name;
 #define FETCH(name, index) texelFetch(name, int(index))
 #endif
+#define FETCH_VIEW(slot, name, of) FETCH_BUFFER(slot, name)
 #define STORAGE_BUFFER(slot, type, name) layout(set = 0, binding = slot, scalar) buffer name##_block { type name[]; };
 #define UNIFORM_BUFFER(slot, type, name) layout(set = 0, binding = slot, scalar) uniform name##_block { type name; };
 #define PUSH_CONSTANTS(type, name) layout(push_constant, scalar) uniform name##_block { type name; };
@@ -20,25 +22,41 @@ FETCH_BUFFER(1, triangles)
 FETCH_BUFFER(2, normals)
 /// Vertex colours by primitive: three linear RGB as float bits.
 FETCH_BUFFER(3, colors)
+/// Materials, MATERIAL_TEXELS each.
+FETCH_BUFFER(4, materials)
+/// Lights, LIGHT_TEXELS each.
+FETCH_BUFFER(5, lights)
 /// Camera, picture, background, grid.
-UNIFORM_BUFFER(4, Frame, frame)
-/// Materials.
-STORAGE_BUFFER(5, Material, materials)
-/// Lights.
-STORAGE_BUFFER(6, Light, lights)
+UNIFORM_BUFFER(6, Frame, frame)
 /// Hits to shade.
 STORAGE_BUFFER(7, HitItem, hit_queue)
+/// The same, to be read.
+FETCH_VIEW(8, hit_items, hit_queue)
 /// Shadow rays to trace.
-STORAGE_BUFFER(8, ShadowItem, shadow_queue)
+STORAGE_BUFFER(9, RayItem, shadow_queue)
+/// The same, to be read.
+FETCH_VIEW(10, shadow_items, shadow_queue)
 /// Reflected rays to trace.
-STORAGE_BUFFER(9, ReflectionItem, reflection_queue)
+STORAGE_BUFFER(11, RayItem, reflection_queue)
+/// The same, to be read.
+FETCH_VIEW(12, reflection_items, reflection_queue)
+/// Rays to trace again: pixel samples, or places in the queue that they came from.
+STORAGE_BUFFER(13, uint, retrace_queue)
 /// Counts of the queues' items; lost rays.
-STORAGE_BUFFER(10, uint, counters)
+STORAGE_BUFFER(14, uint, counters)
 /// Arguments of the indirect dispatches, one a queue.
-STORAGE_BUFFER(11, Dispatch, dispatches)
+STORAGE_BUFFER(15, Dispatch, dispatches)
+/// What each pixel sample's shadow ray adds if nothing blocks it.
+STORAGE_BUFFER(16, vec4, shadow_radiance)
+/// The same, to be read.
+FETCH_VIEW(17, shadow_radiances, shadow_radiance)
+/// Product of the mirror coefficients on each pixel sample's way.
+STORAGE_BUFFER(18, vec4, throughput)
+/// The same, to be read.
+FETCH_VIEW(19, throughputs, throughput)
 /// Radiance of each pixel sample in flight, alpha = coverage.
-STORAGE_BUFFER(12, vec4, radiance)
+STORAGE_BUFFER(20, vec4, radiance)
 /// Sum, at the end mean, of each pixel's samples in the band.
-STORAGE_BUFFER(13, vec4, film)
+STORAGE_BUFFER(21, vec4, film)
 
 PUSH_CONSTANTS(Step, step_now)

@@ -15,3 +15,7 @@ layout(constant_id = 4) const bool SHADOWS = true;
 layout(constant_id = 5) const bool REFLECTIONS = true;
 /// More than one sample a pixel: stratified positions.
 layout(constant_id = 6) const bool MULTISAMPLING = true;
+/// The tree is deeper than the traversal's stack: a ray may have to be traced again.
+layout(constant_id = 7) const bool DEEP_TREE = true;
+/// The kernel traces again what overflowed, with a stack as deep as any tree: a variant, not a need of the scene.
+layout(constant_id = 8) const bool RETRACE = true;

@@ -8,12 +8,20 @@ const uint WORKGROUP = 64u;
 const uint TILE = 8u;
 /// Hard bound on the depth of the tree: the builder keeps it, the traversal's array stack relies on it.
 const uint MAX_TREE_DEPTH = 64u;
+/// Nodes that the traversal's stack of registers holds.
+const uint STACK_REGISTERS = 10u;
 /// Most triangles in a leaf that its 32-bit reference can name.
 const uint MAX_LEAF_TRIANGLES = 15u;
 /// Texels (16 bytes) in one tree node: a record for each of its two children.
 const uint NODE_TEXELS = 2u;
 /// Texels in one triangle of the traversal, and in one triangle's normals or colours.
 const uint TRIANGLE_TEXELS = 3u;
+/// Texels in a Material.
+const uint MATERIAL_TEXELS = 6u;
+/// Texels in a Light.
+const uint LIGHT_TEXELS = 4u;
+/// Texels in a HitItem or a RayItem.
+const uint ITEM_TEXELS = 2u;
 
 /// Triangle flag: only the front face (counter-clockwise) is seen by camera and reflection rays.
 const uint TRIANGLE_SINGLE_SIDED = 1u;
@@ -28,18 +36,20 @@ const uint QUEUE_HIT = 0u;
 const uint QUEUE_SHADOW = 1u;
 /// Queue of reflected rays that wait to be traced.
 const uint QUEUE_REFLECTION = 2u;
+/// Queue of rays whose walk overflowed its stack and is to be done again with a larger one.
+const uint QUEUE_RETRACE = 3u;
 /// Number of queues.
-const uint QUEUES = 3u;
+const uint QUEUES = 4u;
 /// First counter of the items that wait in each queue while it is being filled.
 const uint COUNTER_FILLING = 0u;
 /// First counter of the items that the pass which empties each queue works on.
-const uint COUNTER_READY = 3u;
+const uint COUNTER_READY = 4u;
 /// First counter of the items that each queue has had in all.
-const uint COUNTER_TOTAL = 6u;
+const uint COUNTER_TOTAL = 8u;
 /// Counter of rays whose traversal was cut short.
-const uint COUNTER_LOST = 9u;
+const uint COUNTER_LOST = 12u;
 /// Number of counters.
-const uint COUNTERS = 10u;
+const uint COUNTERS = 13u;
 
 /// Light kind: all directions from a point.
 const uint LIGHT_POINT = 0u;
@@ -99,20 +109,24 @@ struct Step {
     uint samples;
     /// shade: the light whose shadow rays are made.
     uint light;
-    /// shade: 1 when this dispatch adds what needs no light and makes reflection rays (the first light's).
+    /// shade: 1 when this dispatch adds what needs no light (the first light's).
     uint first_light;
-    /// shade: 1 while mirrors may still reflect.
+    /// shade: 1 when this dispatch makes reflected rays (the last light's, while mirrors may still reflect).
     uint reflect;
     /// prepare: bit q set = queue q has been filled and is to be worked on.
     uint queues;
+    /// shade: 1 after the first reflection, when samples have a throughput.
+    uint reflected;
     /// resolve: 1 = divide by the number of samples, the band is complete.
     uint finish;
 };
 
-/// Coefficients of Whitted's model: value = constant + tint · tinted, tint being the vertex colour (1 without).
+/// Coefficients of Whitted's model: value = constant + tint · tinted, tint being the vertex colour (1 without). Whole texels.
 struct Material {
     /// Radiance whatever the light.
     vec3 ambient_tinted;
+    /// Blinn–Phong exponent.
+    float shininess;
     /// Radiance given off.
     vec3 emission;
     /// Lambert coefficient.
@@ -121,35 +135,37 @@ struct Material {
     vec3 specular;
     /// Blinn–Phong coefficient, part that tint multiplies.
     vec3 specular_tinted;
-    /// Blinn–Phong exponent.
-    float shininess;
     /// Mirror coefficient, part that tint leaves alone.
     vec3 mirror;
     /// Mirror coefficient, part that tint multiplies.
     vec3 mirror_tinted;
+    /// Fills the texel.
+    vec2 unused;
 };
 
-/// A light (KHR_lights_punctual).
+/// A light (KHR_lights_punctual). Whole texels.
 struct Light {
-    /// LIGHT_POINT, LIGHT_SPOT or LIGHT_DIRECTIONAL.
-    uint kind;
     /// World position; unused for directional.
     vec3 position;
+    /// LIGHT_POINT, LIGHT_SPOT or LIGHT_DIRECTIONAL.
+    uint kind;
     /// Unit direction in which light travels; unused for point.
     vec3 direction;
-    /// Colour times intensity: candela, or lux for directional.
-    vec3 intensity;
     /// Distance at which the light ends, FAR if it never does.
     float range;
+    /// Colour times intensity: candela, or lux for directional.
+    vec3 intensity;
     /// Cone falloff: clamp(cos·spot_scale + spot_offset)².
     float spot_scale;
     /// See spot_scale.
     float spot_offset;
+    /// Fills the texel.
+    vec3 unused;
 };
 
-/// A hit to be shaded.
+/// A hit to be shaded. Whole texels.
 struct HitItem {
-    /// Pixel sample, index into radiance.
+    /// Pixel sample.
     uint sample_index;
     /// Triangle, in leaf order.
     uint triangle;
@@ -157,34 +173,20 @@ struct HitItem {
     vec2 barycentrics;
     /// Unit direction of the ray that hit.
     vec3 direction;
-    /// Product of the mirror coefficients on the way here.
-    vec3 throughput;
+    /// Fills the texel.
+    uint unused;
 };
 
-/// A light to be added where nothing blocks it.
-struct ShadowItem {
-    /// Pixel sample, index into radiance.
-    uint sample_index;
+/// A ray to be traced: to a light, or reflected. Whole texels.
+struct RayItem {
     /// Start, off the surface.
     vec3 origin;
-    /// Unit direction to the light.
-    vec3 direction;
-    /// Distance to the light.
-    float distance;
-    /// What the light adds if it is visible.
-    vec3 radiance;
-};
-
-/// A reflected ray to be traced.
-struct ReflectionItem {
-    /// Pixel sample, index into radiance.
+    /// Pixel sample.
     uint sample_index;
-    /// Start, off the surface.
-    vec3 origin;
     /// Unit direction.
     vec3 direction;
-    /// Product of the mirror coefficients on the way here.
-    vec3 throughput;
+    /// How far it goes.
+    float distance;
 };
 
 /// Arguments of an indirect dispatch (VkDispatchIndirectCommand).

@@ -1,10 +1,11 @@
 // The tree and the walk through it: a binary tree of quantised boxes, walked while-while (Aila and Laine, HPG 2009), the
 // nearer child first. The stack is a shift register: ten variables that move up and down, touched with constant indices
 // only, because an indexed array costs software Vulkan eight scalar branches a push. When a live entry falls off its end,
-// the walk is done again with an array as deep as the tree can be: rare, and no ray is ever lost.
+// the ray goes to the retrace queue, where a variant of the same kernel walks again with an array as deep as the tree can be:
+// rare, and no ray is ever lost.
 
 const int NOTHING = int(0x80000000); // no node: the stack is empty
-const int REGISTERS = 10;
+const int REGISTERS = int(STACK_REGISTERS);
 /// Nodes after which a walk is given up: far more than any driver's own limit, see Budget.
 const uint MOST_ROUNDS = 1u << 20u;
 
@@ -80,14 +81,12 @@ bool visit_leaf(ShearedRay ray, int leaf, bool culls, inout Budget budget, inout
 }
 
 /// Counts a ray whose walk was cut short. The host turns a count above zero into an error: a wrong picture is never written.
-bool is_complete(int node, Budget budget) {
-    if (node == NOTHING && !budget.cut)
-        return true;
-    atomicAdd(counters[COUNTER_LOST], 1u);
-    return false;
+void check_complete(int node, Budget budget) {
+    if (node != NOTHING || budget.cut)
+        atomicAdd(counters[COUNTER_LOST], 1u);
 }
 
-/// The walk with an array for a stack.
+/// The walk with an array for a stack, as deep as any tree.
 void traverse_deep(GridRay grid, ShearedRay ray, bool any, Budget budget, inout Hit hit) {
     int stack[MAX_TREE_DEPTH];
     int height = 0;
@@ -107,25 +106,23 @@ void traverse_deep(GridRay grid, ShearedRay ray, bool any, Budget budget, inout 
         }
         node = height > 0 && !(any && found) ? stack[--height] : NOTHING;
     }
-    is_complete(node, budget);
+    check_complete(node, budget);
 }
 
-/// Finds the nearest hit, or with `any` some hit, closer than hit.t. A miss leaves hit as it was.
-void traverse(Ray world_ray, bool any, inout Hit hit) {
-    GridRay grid = grid_ray(world_ray);
-    ShearedRay ray = shear_ray(world_ray);
+/// The walk with registers for a stack; false if it overflowed and is worth nothing.
+bool traverse_shallow(GridRay grid, ShearedRay ray, bool any, Budget budget, inout Hit hit) {
     int stack[REGISTERS];
     [[unroll]] for (int i = 0; i < REGISTERS; i++)
         stack[i] = NOTHING;
     int overflow = 0;
-    Budget budget = Budget(0u, false);
     int node = 0;
     while (node != NOTHING && budget.rounds < MOST_ROUNDS) {
         while (node >= 0 && budget.rounds < MOST_ROUNDS) {
             budget.rounds++;
             Visit next = visit(grid, node, hit.t);
             node = next.none ? stack[0] : next.nearer;
-            overflow |= next.both ? stack[REGISTERS - 1] ^ NOTHING : 0;
+            if (DEEP_TREE)
+                overflow |= next.both ? stack[REGISTERS - 1] ^ NOTHING : 0;
             if (next.both) {
                 [[unroll]] for (int i = REGISTERS - 1; i > 0; i--)
                     stack[i] = stack[i - 1];
@@ -149,19 +146,24 @@ void traverse(Ray world_ray, bool any, inout Hit hit) {
             overflow = 0;
         }
     }
-    if (is_complete(node, budget) && overflow != 0)
+    check_complete(node, budget);
+    return overflow == 0;
+}
+
+/// Finds the nearest hit, or with `any` some hit, closer than hit.t; a miss leaves hit as it was. False: the ray must be traced
+/// again by a kernel with RETRACE, its answer is worth nothing.
+bool traverse(Ray world_ray, bool any, inout Hit hit) {
+    GridRay grid = grid_ray(world_ray);
+    ShearedRay ray = shear_ray(world_ray);
+    Budget budget = Budget(0u, false);
+    if (RETRACE) {
         traverse_deep(grid, ray, any, budget, hit);
+        return true;
+    }
+    return traverse_shallow(grid, ray, any, budget, hit);
 }
 
-/// The nearest hit; its triangle is NO_TRIANGLE when there is none.
-Hit nearest_hit(Ray ray) {
-    Hit hit = Hit(FAR, NO_TRIANGLE, NO_TRIANGLE, vec2(0.0));
-    traverse(ray, false, hit);
-    return hit;
-}
-
-bool any_hit(Ray ray, float distance) {
-    Hit hit = Hit(distance, NO_TRIANGLE, 0u, vec2(0.0));
-    traverse(ray, true, hit);
-    return hit.triangle != NO_TRIANGLE;
+/// No hit yet, and none wanted beyond `distance`.
+Hit no_hit(float distance) {
+    return Hit(distance, NO_TRIANGLE, NO_TRIANGLE, vec2(0.0));
 }

@@ -95,9 +95,9 @@ impl BenchArgs {
             build_ms.push(milliseconds(start));
         }
         let tree = tree.unwrap_or_else(|| Tree::build(&prepared.soup, self.bvh.into()));
-        let tracer = renderer.tracer(&scene, &prepared, &tree)?;
+        let mut tracer = renderer.tracer(&scene, &prepared, &tree)?;
         let mut files = Files::of(&self, &scene.name, &view);
-        let sets = self.trace(&tracer, &prepared, &view, &options, &mut files)?;
+        let sets = self.trace(&mut tracer, &prepared, &view, &options, &mut files)?;
         if self.validate && !renderer.device().instance.messages().is_empty() {
             return Err(Error::Validation(renderer.device().instance.messages()));
         }
@@ -150,7 +150,7 @@ impl BenchArgs {
 
     fn trace(
         &self,
-        tracer: &Tracer,
+        tracer: &mut Tracer,
         prepared: &Prepared,
         view: &BenchView,
         options: &Options,

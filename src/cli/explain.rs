@@ -40,14 +40,15 @@ impl ExplainArgs {
         let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
         let options = self.view.options()?;
         let Prepared { soup, view, features } = Prepared::new(&scene, &options)?;
-        let nodes = Tree::build(&soup, options.quality(soup.len())).bvh.nodes.len();
+        let tree = Tree::build(&soup, options.quality(soup.len()));
+        let (features, nodes) = (tree.features(features), tree.bvh.nodes.len());
         let plan = Plan::new(&scene, &soup, &view, features, nodes, options.samples_in_flight);
         match if self.json { Form::Json } else { self.format } {
             Form::Text => Ok(Outcome::text(text(&plan, &scene.name, view.samples))),
             Form::Mermaid => Ok(Outcome::text(mermaid(&plan))),
             Form::Json => Outcome::json(&json!({
                 "scene": scene.name,
-                "features": features.list().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+                "features": features.needs().collect::<std::collections::BTreeMap<_, _>>(),
                 "passes": plan.passes.iter().map(|pass| json!({"name": pass.name, "dispatches": pass.dispatches})).collect::<Vec<_>>(),
                 "buffers": plan.buffers.iter().map(|buffer| json!({"name": buffer.name, "bytes": buffer.bytes})).collect::<Vec<_>>(),
                 "left_out": plan.left_out.iter().map(|left| json!({"name": left.name, "reason": left.reason})).collect::<Vec<_>>(),
@@ -82,7 +83,7 @@ fn text(plan: &Plan, name: &str, samples: u32) -> String {
         let _ = writeln!(text, "  {:<18}{:>10}", buffer.name, size(buffer.bytes));
     }
     let _ = writeln!(text, "features:");
-    for (feature, on) in plan.features.list() {
+    for (feature, on) in plan.features.needs() {
         let _ = writeln!(text, "  {feature:<18}{:>10}", if on { "on" } else { "off" });
     }
     let _ = writeln!(text, "left out:");

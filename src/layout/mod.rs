@@ -18,6 +18,13 @@ mod generated_features {
 }
 pub use generated_features::Features;
 
+impl Features {
+    /// Names and values of what a scene may need: all but the variant of a kernel.
+    pub fn needs(&self) -> impl Iterator<Item = (&'static str, bool)> {
+        self.list().into_iter().filter(|(name, _)| *name != "retrace")
+    }
+}
+
 /// Descriptor slots.
 pub mod binding {
     use super::{Binding, BindingKind};
@@ -50,6 +57,8 @@ pub struct Binding {
     pub name: &'static str,
     /// How it is reached.
     pub kind: BindingKind,
+    /// The slot whose buffer this one shows, if it has none of its own.
+    pub view_of: Option<u32>,
 }
 
 /// One kernel, compiled.

@@ -91,18 +91,32 @@ pub const MEMBERS: &[(&str, &str, usize)] = &[
 pub fn bindings(source: &str) -> Result<String, Unknown> {
     let mut constants = String::new();
     let mut list = String::new();
+    let mut known: Vec<String> = Vec::new();
     walk("bindings.glsl", source, |line, doc| {
+        let mut view_of = None;
         let (kind, arguments) = line.strip_suffix(')')?.split_once('(')?;
         let arguments: Vec<&str> = arguments.split(", ").collect();
         let (slot, name, kind) = match (kind, arguments[..].as_ref()) {
             ("FETCH_BUFFER", [slot, name]) => (slot, name, "Fetch"),
+            ("FETCH_VIEW", [slot, name, of]) => {
+                let number = known.iter().position(|known| known == of)?;
+                view_of = Some(number);
+                (slot, name, "Fetch")
+            }
             ("STORAGE_BUFFER", [slot, _, name]) => (slot, name, "Storage"),
             ("UNIFORM_BUFFER", [slot, _, name]) => (slot, name, "Uniform"),
             ("PUSH_CONSTANTS", [_, _]) => return Some(()),
             _ => return None,
         };
         writeln!(constants, "/// Slot of `{name}`: {doc}\npub const {}: u32 = {slot};", name.to_uppercase()).ok()?;
-        writeln!(list, "    Binding {{ slot: {slot}, name: \"{name}\", kind: BindingKind::{kind} }},").ok()
+        // Slots are dense, so that a slot is an index into the list.
+        (*slot == known.len().to_string()).then_some(())?;
+        known.push((*name).to_owned());
+        writeln!(
+            list,
+            "    Binding {{ slot: {slot}, name: \"{name}\", kind: BindingKind::{kind}, view_of: {view_of:?} }},"
+        )
+        .ok()
     })?;
     Ok(format!("{constants}/// Every binding, by slot.\npub const ALL: &[Binding] = &[\n{list}];\n"))
 }

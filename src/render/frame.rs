@@ -4,12 +4,13 @@ use super::{upload, Options, Plan, Renderer};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{
-    binding, kernels, Step, COUNTERS, COUNTER_LOST, COUNTER_TOTAL, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW, TILE,
-    WORKGROUP,
+    binding, kernels, Features, Step, COUNTERS, COUNTER_FILLING, COUNTER_LOST, COUNTER_TOTAL, QUEUES, QUEUE_HIT,
+    QUEUE_REFLECTION, QUEUE_RETRACE, QUEUE_SHADOW, TILE, WORKGROUP,
 };
 use crate::report;
 use crate::scene::{Background, View};
 use crate::vulkan::{Access, Bindings, Buffer, Commands, Kernel, Memory, Usage};
+use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::sync::Arc;
 
@@ -18,23 +19,36 @@ pub(super) struct Frame<'a> {
     pub renderer: &'a Renderer,
     view: &'a View,
     plan: Plan,
-    pub kernels: Kernels,
+    pub trace: Tracers,
+    /// Variants that trace again what overflowed its stack; made when that first happens.
+    again: Option<Tracers>,
+    prepare: Arc<Kernel>,
+    shade: Arc<Kernel>,
+    resolve: Arc<Kernel>,
     // Dropped before the buffers it names.
     pub bindings: Bindings,
-    /// By slot.
-    pub buffers: Vec<Buffer>,
+    /// By slot; views have none of their own.
+    buffers: BTreeMap<u32, Buffer>,
     /// Where the host reads: the counters of a wave, then the film of a band.
     read_back: Buffer,
 }
 
-/// The kernels of the passes that this frame has.
-pub(super) struct Kernels {
+/// The kernels that trace rays, as far as the frame has such rays.
+pub(super) struct Tracers {
     pub primary: Arc<Kernel>,
-    prepare: Arc<Kernel>,
-    shade: Arc<Kernel>,
     pub shadow: Option<Arc<Kernel>>,
     pub reflection: Option<Arc<Kernel>>,
-    resolve: Arc<Kernel>,
+}
+
+impl Tracers {
+    fn new(renderer: &Renderer, features: Features) -> Result<Self> {
+        let kernel = |code| renderer.kernel(code, features);
+        Ok(Self {
+            primary: kernel(&kernels::PRIMARY)?,
+            shadow: features.shadows.then(|| kernel(&kernels::SHADOW)).transpose()?,
+            reflection: features.reflections.then(|| kernel(&kernels::REFLECTION)).transpose()?,
+        })
+    }
 }
 
 /// What a frame tells besides its pixels.
@@ -55,103 +69,144 @@ impl<'a> Frame<'a> {
     /// Allocates and fills the buffers of the plan and makes its kernels.
     pub fn new(renderer: &'a Renderer, view: &'a View, scene: upload::Scene, plan: Plan) -> Result<Self> {
         let features = plan.features;
-        let kernel = |code| renderer.kernel(code, features);
-        let kernels = Kernels {
-            primary: kernel(&kernels::PRIMARY)?,
-            prepare: kernel(&kernels::PREPARE)?,
-            shade: kernel(&kernels::SHADE)?,
-            shadow: features.shadows.then(|| kernel(&kernels::SHADOW)).transpose()?,
-            reflection: features.reflections.then(|| kernel(&kernels::REFLECTION)).transpose()?,
-            resolve: kernel(&kernels::RESOLVE)?,
-        };
+        let owners = binding::ALL.iter().filter(|slot| slot.view_of.is_none());
         let buffers = plan
             .buffers
             .iter()
-            .zip(binding::ALL)
+            .zip(owners)
             .map(|(planned, slot)| {
                 assert_eq!(planned.name, slot.name, "the plan lists buffers in the order of their slots");
                 let filled = scene.buffer(renderer, slot.slot, features);
-                filled.unwrap_or_else(|| upload::frame_buffer(renderer, slot.slot, slot.name, planned.bytes))
+                let buffer =
+                    filled.unwrap_or_else(|| upload::frame_buffer(renderer, slot.slot, slot.name, planned.bytes));
+                buffer.map(|buffer| (slot.slot, buffer))
             })
-            .collect::<Result<Vec<_>>>()?;
-        let bindings = Bindings::new(&renderer.layout, |slot| &buffers[slot as usize])?;
+            .collect::<Result<BTreeMap<_, _>>>()?;
+        let shown = |slot: u32| binding::ALL[slot as usize].view_of.unwrap_or(slot);
+        let bindings = Bindings::new(&renderer.layout, |slot| &buffers[&shown(slot)])?;
         let read_back = COUNTER_BYTES as u64 + u64::from(plan.band_pixels) * PIXEL_BYTES as u64;
         let read_back = Buffer::new(&renderer.device, "read back", read_back, Usage::Storage, Memory::ReadBack)?;
-        Ok(Self { renderer, view, plan, kernels, bindings, buffers, read_back })
+        Ok(Self {
+            renderer,
+            view,
+            trace: Tracers::new(renderer, features)?,
+            again: None,
+            prepare: renderer.kernel(&kernels::PREPARE, features)?,
+            shade: renderer.kernel(&kernels::SHADE, features)?,
+            resolve: renderer.kernel(&kernels::RESOLVE, features)?,
+            plan,
+            bindings,
+            buffers,
+            read_back,
+        })
+    }
+
+    /// The buffer of a slot.
+    pub fn buffer(&self, slot: u32) -> &Buffer {
+        &self.buffers[&slot]
     }
 
     /// Records one wave: the whole algorithm.
     fn record(&self, commands: &mut Commands, wave: Step) {
         let Plan { rounds, lights, .. } = self.plan;
-        let kernels = &self.kernels;
-        let arguments = &self.buffers[binding::DISPATCHES as usize];
+        let Tracers { primary, shadow, reflection } = &self.trace;
+        let arguments = self.buffer(binding::DISPATCHES);
         let samples = wave.pixels * wave.samples;
-        let bit = |queue: u32, needed: bool| u32::from(needed) << queue;
 
-        commands.clear(&self.buffers[binding::COUNTERS as usize]);
+        commands.clear(self.buffer(binding::COUNTERS));
         // Counters: the fill wrote, kernels count on.
         commands.barrier(Access::Transfer, Access::ShaderReadWrite);
-        commands.bind(&kernels.primary, &self.bindings);
-        commands.dispatch(&kernels.primary, bytemuck::bytes_of(&wave), samples.div_ceil(WORKGROUP));
+        commands.bind(primary, &self.bindings);
+        commands.dispatch(primary, bytemuck::bytes_of(&wave), samples.div_ceil(WORKGROUP));
+        self.trace_again(commands, wave, |again| Some(&again.primary));
 
         for round in 0..rounds {
-            let reflect = kernels.reflection.is_some() && round + 1 < rounds;
-            self.prepare(commands, bit(QUEUE_HIT, true));
+            let may_reflect = reflection.is_some() && round + 1 < rounds;
+            self.prepare(commands, &[QUEUE_HIT]);
             for light in 0..lights {
-                let (first, last) = (light == 0, light + 1 == lights);
-                let step = Step { light, first_light: first.into(), reflect: reflect.into(), ..wave };
-                commands.dispatch_indirect(&kernels.shade, bytemuck::bytes_of(&step), arguments, QUEUE_HIT.into());
-                if kernels.shadow.is_some() || (reflect && last) {
-                    let filled = bit(QUEUE_SHADOW, kernels.shadow.is_some()) | bit(QUEUE_REFLECTION, reflect && last);
-                    self.prepare(commands, filled);
+                let reflect = may_reflect && light + 1 == lights;
+                let step = Step {
+                    light,
+                    first_light: u32::from(light == 0),
+                    reflect: reflect.into(),
+                    reflected: u32::from(round > 0),
+                    ..wave
+                };
+                commands.dispatch_indirect(&self.shade, bytemuck::bytes_of(&step), arguments, QUEUE_HIT.into());
+                match (shadow.is_some(), reflect) {
+                    (true, true) => self.prepare(commands, &[QUEUE_SHADOW, QUEUE_REFLECTION]),
+                    (true, false) => self.prepare(commands, &[QUEUE_SHADOW]),
+                    (false, true) => self.prepare(commands, &[QUEUE_REFLECTION]),
+                    (false, false) => {}
                 }
-                if let Some(shadow) = &kernels.shadow {
+                if let Some(shadow) = shadow {
                     commands.dispatch_indirect(shadow, bytemuck::bytes_of(&wave), arguments, QUEUE_SHADOW.into());
+                    self.trace_again(commands, wave, |again| again.shadow.as_ref());
                     // Radiance and shadow queue: this light's shadow rays before the next pass on the same samples.
                     commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
                 }
             }
-            if let (Some(reflection), true) = (&kernels.reflection, reflect) {
+            if let (Some(reflection), true) = (reflection, may_reflect) {
                 commands.dispatch_indirect(reflection, bytemuck::bytes_of(&wave), arguments, QUEUE_REFLECTION.into());
+                self.trace_again(commands, wave, |again| again.reflection.as_ref());
             }
         }
         // Radiance: every pass wrote, resolve reads. Film: the wave before wrote, resolve adds.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
-        commands.dispatch(&kernels.resolve, bytemuck::bytes_of(&wave), wave.pixels.div_ceil(WORKGROUP));
+        commands.dispatch(&self.resolve, bytemuck::bytes_of(&wave), wave.pixels.div_ceil(WORKGROUP));
         // Film and counters: kernels wrote, copies read.
         commands.barrier(Access::ShaderWrite, Access::Transfer);
-        commands.copy(&self.buffers[binding::COUNTERS as usize], &self.read_back, 0, COUNTER_BYTES as u64);
+        commands.copy(self.buffer(binding::COUNTERS), &self.read_back, 0, COUNTER_BYTES as u64);
         if wave.finish != 0 {
             let bytes = u64::from(wave.pixels) * PIXEL_BYTES as u64;
-            commands.copy(&self.buffers[binding::FILM as usize], &self.read_back, COUNTER_BYTES as u64, bytes);
+            commands.copy(self.buffer(binding::FILM), &self.read_back, COUNTER_BYTES as u64, bytes);
         }
         // What was read back: copies wrote, the host reads.
         commands.barrier(Access::Transfer, Access::HostRead);
     }
 
     /// Makes filled queues ready, with a barrier on either side.
-    pub fn prepare(&self, commands: &mut Commands, queues: u32) {
+    pub fn prepare(&self, commands: &mut Commands, queues: &[u32]) {
+        let queues = queues.iter().map(|queue| 1 << queue).sum();
         // Queues and counters: the pass before filled them, prepare reads.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
-        commands.dispatch(&self.kernels.prepare, bytemuck::bytes_of(&Step { queues, ..Step::default() }), 1);
+        commands.dispatch(&self.prepare, bytemuck::bytes_of(&Step { queues, ..Step::default() }), 1);
         // Arguments: prepare wrote, indirect dispatches read them and their kernels the counters.
         commands.barrier(Access::ShaderWrite, Access::ShaderAndIndirect);
     }
 
+    /// Traces again what overflowed in the pass before, once it is known that anything does.
+    pub fn trace_again<'k>(
+        &'k self,
+        commands: &mut Commands,
+        wave: Step,
+        kernel: impl Fn(&'k Tracers) -> Option<&'k Arc<Kernel>>,
+    ) {
+        if let Some(kernel) = self.again.as_ref().and_then(kernel) {
+            self.prepare(commands, &[QUEUE_RETRACE]);
+            let arguments = self.buffer(binding::DISPATCHES);
+            commands.dispatch_indirect(kernel, bytemuck::bytes_of(&wave), arguments, QUEUE_RETRACE.into());
+        }
+    }
+
+    /// Whether rays overflowed that nobody traced again: the wave is worth nothing and must be run once more.
+    pub fn must_run_again(&mut self, counters: &[u32]) -> Result<bool> {
+        let overflowed = counters[(COUNTER_FILLING + QUEUE_RETRACE) as usize] > 0;
+        if overflowed {
+            self.again = Some(Tracers::new(self.renderer, Features { retrace: true, ..self.plan.features })?);
+        }
+        Ok(overflowed)
+    }
+
     /// Runs all waves of all bands and collects the film.
-    pub fn run(self, options: &Options) -> Result<(Film, Outcome)> {
+    pub fn run(mut self, options: &Options) -> Result<(Film, Outcome)> {
         let Plan { padded_pixels, band_pixels, wave_samples, .. } = self.plan;
         let samples = self.view.samples;
-        let dispatches: u64 = self.plan.passes.iter().map(|pass| pass.dispatches).sum();
-        let timed = (dispatches / self.plan.waves(samples)).min(MOST_TIMED) as usize;
         let mut film = Film::new(self.view.width, self.view.height, self.view.background == Background::Transparent);
         let mut totals = Totals::new(&self.plan);
         for first_pixel in (0..padded_pixels).step_by(band_pixels as usize) {
             let pixels = u64::from(band_pixels).min(padded_pixels - first_pixel) as u32;
             for first_sample in (0..samples).step_by(wave_samples as usize) {
-                if options.interrupted.load(Ordering::Relaxed) {
-                    return Err(Error::Interrupted);
-                }
                 let count = wave_samples.min(samples - first_sample);
                 let wave = Step {
                     first_pixel: first_pixel as u32,
@@ -161,10 +216,7 @@ impl<'a> Frame<'a> {
                     finish: u32::from(first_sample + count == samples),
                     ..Step::default()
                 };
-                let mut commands = Commands::new(&self.renderer.device, timed)?;
-                self.record(&mut commands, wave);
-                totals.add_times(&commands.submit_and_wait()?);
-                totals.add_counters(bytemuck::cast_slice(&self.read_back.read()?[..COUNTER_BYTES]))?;
+                while !self.run_wave(wave, options, &mut totals)? {}
                 if let Some(progress) = &options.progress {
                     let done = first_pixel * u64::from(samples) + u64::from(pixels) * u64::from(first_sample + count);
                     progress(done, padded_pixels * u64::from(samples));
@@ -173,6 +225,25 @@ impl<'a> Frame<'a> {
             self.collect(&mut film, first_pixel, pixels)?;
         }
         Ok((film, totals.outcome(self.view, &self.plan)))
+    }
+
+    /// Runs one wave; false when it must be run once more.
+    fn run_wave(&mut self, wave: Step, options: &Options, totals: &mut Totals) -> Result<bool> {
+        if options.interrupted.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        let dispatches = self.plan.dispatches_of_a_wave(self.view.samples);
+        let timed = if self.again.is_some() { 3 * dispatches } else { dispatches };
+        let mut commands = Commands::new(&self.renderer.device, timed.min(MOST_TIMED) as usize)?;
+        self.record(&mut commands, wave);
+        totals.add_times(&commands.submit_and_wait()?);
+        let mut counters = [0; COUNTERS as usize];
+        counters.copy_from_slice(bytemuck::cast_slice(&self.read_back.read()?[..4 * COUNTERS as usize]));
+        if self.must_run_again(&counters)? {
+            return Ok(false);
+        }
+        totals.add_counters(&counters)?;
+        Ok(true)
     }
 
     /// Copies a band from tile order to the rows of the film.
@@ -215,51 +286,52 @@ pub(super) fn all_complete(counters: &[u32]) -> Result<()> {
 /// Sums over waves.
 struct Totals {
     passes: Vec<report::Pass>,
-    hits: u64,
-    shadow: u64,
-    reflection: u64,
+    /// Items that each queue has had.
+    queued: [u64; QUEUES as usize],
 }
 
 impl Totals {
     fn new(plan: &Plan) -> Self {
-        let pass = |planned: &super::PlannedPass| report::Pass {
-            name: planned.name,
-            dispatches: planned.dispatches,
-            ..Default::default()
-        };
-        Self { passes: plan.passes.iter().map(pass).collect(), hits: 0, shadow: 0, reflection: 0 }
+        let pass = |planned: &super::PlannedPass| report::Pass { name: planned.name, ..Default::default() };
+        Self { passes: plan.passes.iter().map(pass).collect(), queued: [0; QUEUES as usize] }
     }
 
     fn add_times(&mut self, times: &[(&'static str, f64)]) {
         for (name, ms) in times {
+            if !self.passes.iter().any(|pass| pass.name == *name) {
+                self.passes.push(report::Pass { name, ..Default::default() });
+            }
             if let Some(pass) = self.passes.iter_mut().find(|pass| pass.name == *name) {
+                pass.dispatches += 1;
                 pass.ms += ms;
             }
         }
     }
 
     fn add_counters(&mut self, counters: &[u32]) -> Result<()> {
-        let total = |queue: u32| u64::from(counters[(COUNTER_TOTAL + queue) as usize]);
-        self.hits += total(QUEUE_HIT);
-        self.shadow += total(QUEUE_SHADOW);
-        self.reflection += total(QUEUE_REFLECTION);
+        for (queue, total) in self.queued.iter_mut().enumerate() {
+            *total += u64::from(counters[COUNTER_TOTAL as usize + queue]);
+        }
         all_complete(counters)
     }
 
     fn outcome(mut self, view: &View, plan: &Plan) -> Outcome {
         let pixels = u64::from(view.width) * u64::from(view.height);
         let primary = pixels * u64::from(view.samples);
+        let queued = |queue: u32| self.queued[queue as usize];
+        let (shadow, reflection) = (queued(QUEUE_SHADOW), queued(QUEUE_REFLECTION));
         for pass in &mut self.passes {
             pass.items = match pass.name {
                 "primary" => primary,
-                "shade" => self.hits * u64::from(plan.lights),
-                "shadow" => self.shadow,
-                "reflection" => self.reflection,
+                "shade" => self.queued[QUEUE_HIT as usize] * u64::from(plan.lights),
+                "shadow" => shadow,
+                "reflection" => reflection,
+                "retrace" => self.queued[QUEUE_RETRACE as usize],
                 "resolve" => pixels * u64::from(view.samples.div_ceil(plan.wave_samples)),
                 _ => pass.dispatches,
             };
         }
-        let rays = report::Rays { primary, shadow: self.shadow, reflection: self.reflection };
+        let rays = report::Rays { primary, shadow, reflection };
         Outcome { passes: self.passes, rays, queue_bytes: plan.queue_bytes() }
     }
 }

@@ -16,7 +16,7 @@ pub use tree::Tree;
 use crate::bvh::quantise;
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::layout::{binding, BindingKind, Features, KernelCode, ShadowItem, Step};
+use crate::layout::{binding, BindingKind, Features, KernelCode, RayItem, Step};
 use crate::report::{self, Report};
 use crate::scene::{Scene, Soup, View};
 use crate::vulkan::{BindingSlot, Device, DeviceChoice, Fetch, Habits, Instance, Kernel, Layout, SlotKind};
@@ -67,6 +67,7 @@ impl Prepared {
         let view = options.view(scene, &soup)?;
         let features =
             if options.all_features { Features::ALL } else { crate::scene::features::of(scene, &soup, &view) };
+        let features = Features { retrace: false, ..features };
         Ok(Self { soup, view, features })
     }
 }
@@ -125,7 +126,8 @@ impl Renderer {
             Fetch::Storage => code.storage_fetch,
         };
         let constants = features.list().map(|(_, on)| on);
-        let kernel = Arc::new(Kernel::new(&self.layout, code.name, spirv, &constants)?);
+        let name = if features.retrace { "retrace" } else { code.name };
+        let kernel = Arc::new(Kernel::new(&self.layout, name, spirv, &constants)?);
         kernels.insert((code.name, features), kernel.clone());
         Ok(kernel)
     }
@@ -172,10 +174,11 @@ impl Renderer {
     ) -> Result<(Film, Report)> {
         let _frame = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
         let Prepared { soup, view, features } = prepared;
+        let features = tree.features(*features);
         // No queue may be larger than what the device binds at once.
-        let most = self.device.info.max_storage_bytes / size_of::<ShadowItem>() as u64;
+        let most = self.device.info.max_storage_bytes / size_of::<RayItem>() as u64;
         let in_flight = options.samples_in_flight.min(u32::try_from(most).unwrap_or(u32::MAX));
-        let plan = Plan::new(scene, soup, view, *features, tree.bvh.nodes.len(), in_flight);
+        let plan = Plan::new(scene, soup, view, features, tree.bvh.nodes.len(), in_flight);
         let start = Instant::now();
         let quantised = quantise(&tree.bvh, (view.camera.eye - tree.center).abs().as_vec3());
         let frame =
@@ -193,7 +196,7 @@ impl Renderer {
             image: report::Image { width: view.width, height: view.height, ..Default::default() },
             device: describe_device(&self.device),
             scene: describe(scene, soup, view),
-            features: features.list().into_iter().collect(),
+            features: features.needs().collect(),
             passes: outcome.passes,
             rays: outcome.rays,
             bvh: report::Tree {

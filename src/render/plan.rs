@@ -1,9 +1,7 @@
 //! What a scene gets: features, passes, buffers; and what was left out and why. Computed without any device, and the only
 //! source from which the frame is recorded and buffers are allocated.
 
-use crate::layout::{
-    Features, HitItem, Light, Material, ReflectionItem, ShadowItem, NODE_TEXELS, TILE, TRIANGLE_TEXELS, WORKGROUP,
-};
+use crate::layout::{Features, HitItem, Light, Material, RayItem, NODE_TEXELS, TILE, TRIANGLE_TEXELS, WORKGROUP};
 use crate::scene::{Scene, Soup, View};
 
 /// Bytes of a texel.
@@ -61,7 +59,7 @@ pub struct Plan {
     pub lights: u32,
     /// Passes in the order of the frame.
     pub passes: Vec<PlannedPass>,
-    /// Buffers in the order of their slots.
+    /// Buffers in the order of their slots, without those that are views of others.
     pub buffers: Vec<PlannedBuffer>,
     /// What was left out.
     pub left_out: Vec<LeftOut>,
@@ -97,6 +95,11 @@ impl Plan {
     /// Waves in the whole picture.
     pub fn waves(&self, samples: u32) -> u64 {
         self.bands() * u64::from(samples.div_ceil(self.wave_samples))
+    }
+
+    /// Dispatches in a wave, without those that trace rays again.
+    pub fn dispatches_of_a_wave(&self, samples: u32) -> u64 {
+        self.passes.iter().map(|pass| pass.dispatches).sum::<u64>() / self.waves(samples)
     }
 
     fn bands(&self) -> u64 {
@@ -148,15 +151,18 @@ impl Plan {
         buffer("triangles", per_triangle(true), false);
         buffer("normals", per_triangle(features.smooth_normals), false);
         buffer("colors", per_triangle(features.vertex_colors), false);
-        buffer("frame", size_of::<crate::layout::Frame>() as u64, false);
         buffer("materials", (scene.materials.len() * size_of::<Material>()) as u64, false);
         let lights = if features.shadows { view.lights.len().max(1) * size_of::<Light>() } else { 0 };
         buffer("lights", lights as u64, false);
+        buffer("frame", size_of::<crate::layout::Frame>() as u64, false);
         buffer("hit_queue", queue(true, size_of::<HitItem>()), true);
-        buffer("shadow_queue", queue(features.shadows, size_of::<ShadowItem>()), true);
-        buffer("reflection_queue", queue(features.reflections, size_of::<ReflectionItem>()), true);
+        buffer("shadow_queue", queue(features.shadows, size_of::<RayItem>()), true);
+        buffer("reflection_queue", queue(features.reflections, size_of::<RayItem>()), true);
+        buffer("retrace_queue", queue(features.deep_tree, size_of::<u32>()), true);
         buffer("counters", (4 * u64::from(crate::layout::COUNTERS)).next_multiple_of(PIXEL), false);
         buffer("dispatches", 12 * u64::from(crate::layout::QUEUES), false);
+        buffer("shadow_radiance", queue(features.shadows, PIXEL as usize), true);
+        buffer("throughput", queue(features.reflections, PIXEL as usize), true);
         buffer("radiance", in_flight * PIXEL, false);
         buffer("film", u64::from(self.band_pixels) * PIXEL, false);
     }
@@ -170,12 +176,13 @@ impl Plan {
                 self.left_out.extend(names.iter().map(|name| LeftOut { name, reason: reason.into() }));
             }
         };
-        leave(features.shadows, &["shadow pass", "shadow_queue", "lights"], no_light);
+        leave(features.shadows, &["shadow pass", "shadow_queue", "shadow_radiance", "lights"], no_light);
         leave(features.specular, &["specular term"], if features.shadows { "no material is glossy" } else { no_light });
-        leave(features.reflections, &["reflection pass", "reflection_queue"], no_mirror);
+        leave(features.reflections, &["reflection pass", "reflection_queue", "throughput"], no_mirror);
         leave(features.smooth_normals, &["normals"], "all triangles are flat");
         leave(features.vertex_colors, &["colors"], "no mesh has vertex colours");
         leave(features.single_sided, &["back-face culling"], "all materials are double-sided");
+        leave(features.deep_tree, &["retrace_queue"], "the tree is no deeper than the stack");
         leave(features.multisampling, &["sample positions"], "one sample a pixel goes through its centre");
     }
 

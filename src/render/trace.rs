@@ -1,18 +1,19 @@
 //! Ray sets through the very kernels that render: `primary` makes its own rays, `reflection` and `shadow` get theirs in their
 //! queues, filled by the host instead of `shade`.
 
-use super::frame::Frame;
+use super::frame::{all_complete, Frame};
 use super::ray_sets::{BenchRay, SetKind};
 use super::{upload, Options, Plan, Renderer};
 use crate::bvh::quantise;
 use crate::error::{Error, Result};
 use crate::layout::{
-    binding, Features, HitItem, ReflectionItem, ShadowItem, Step, COUNTERS, COUNTER_FILLING, QUEUE_HIT,
-    QUEUE_REFLECTION, QUEUE_SHADOW, WORKGROUP,
+    binding, Features, HitItem, RayItem, Step, COUNTERS, COUNTER_FILLING, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW,
+    WORKGROUP,
 };
 use crate::scene::{Scene, View};
-use crate::vulkan::{Access, Commands};
+use crate::vulkan::{Access, Buffer, Commands, Kernel};
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A scene on the device, ready to trace rays.
@@ -61,7 +62,7 @@ impl Renderer {
         tree: &'a super::Tree,
     ) -> Result<Tracer<'a>> {
         let View { width, height, .. } = prepared.view;
-        let features = Features { shadows: true, reflections: true, ..Features::default() };
+        let features = tree.features(Features { shadows: true, reflections: true, ..Features::default() });
         let plan = Plan::new(scene, &prepared.soup, &prepared.view, features, tree.bvh.nodes.len(), width * height);
         if plan.waves(1) != 1 {
             return Err(Error::Usage(format!("{width}x{height} rays do not fit into one wave")));
@@ -78,123 +79,103 @@ impl Tracer<'_> {
     ///
     /// # Errors
     /// `Device` when the rays do not fit or one is lost; `Vulkan` when the device fails.
-    pub fn trace(&self, kind: SetKind, rays: &[BenchRay], runs: usize, options: &Options) -> Result<Trace> {
-        let Frame { renderer, buffers, .. } = &self.frame;
-        let device = &renderer.device;
-        let (queue, items) = self.items(kind, rays);
-        let slot = match kind {
-            SetKind::Primary => None,
-            SetKind::Shadow => Some(binding::SHADOW_QUEUE),
-            SetKind::Mirror | SetKind::Diffuse => Some(binding::REFLECTION_QUEUE),
-        };
-        let target = slot.map(|slot| &buffers[slot as usize]);
-        if target.is_some_and(|target| (items.len() as u64) > target.bytes) {
+    pub fn trace(&mut self, kind: SetKind, rays: &[BenchRay], runs: usize, options: &Options) -> Result<Trace> {
+        let input = Input::new(self.frame.renderer, kind, rays, self.tree.center)?;
+        if rays.len() > (self.prepared.view.width * self.prepared.view.height) as usize {
             return Err(Error::Device(format!("{} rays do not fit into the queue", rays.len())));
         }
-        let mut counters = vec![0_u32; COUNTERS as usize];
-        counters[(COUNTER_FILLING + queue) as usize] = if slot.is_some() { rays.len() as u32 } else { 0 };
-        let counters = upload::staging(renderer, bytemuck::cast_slice(&counters))?;
-        let items = upload::staging(renderer, &items)?;
         let mut trace = Trace { met: Vec::new(), wall_ms: Vec::new(), device_ms: Vec::new() };
-        for run in 0..=runs {
+        let mut run = 0;
+        while run <= runs {
             if options.interrupted.load(std::sync::atomic::Ordering::Relaxed) {
                 return Err(Error::Interrupted);
             }
-            let mut commands = Commands::new(device, 0)?;
-            commands.copy(&counters, &buffers[binding::COUNTERS as usize], 0, 4 * u64::from(COUNTERS));
-            commands.clear(&buffers[binding::RADIANCE as usize]);
-            if let Some(target) = target {
-                commands.copy(&items, target, 0, items.bytes.min(target.bytes));
+            self.fill(&input)?;
+            let (wall, device) = self.run(kind, rays.len() as u32)?;
+            let counters = upload::read_back(self.frame.renderer, self.frame.buffer(binding::COUNTERS))?;
+            let counters: &[u32] = bytemuck::cast_slice(counters.read()?);
+            all_complete(counters)?;
+            if self.frame.must_run_again(counters)? {
+                continue;
             }
-            // Counters, radiance, queue: copies wrote, kernels of the next submission read and write.
-            commands.barrier(Access::Transfer, Access::ShaderReadWrite);
-            commands.submit_and_wait()?;
-            let (wall, spans) = self.run(kind, queue, rays.len() as u32)?;
             if run > 0 {
                 trace.wall_ms.push(wall);
-                let pass = spans.iter().filter(|(name, _)| *name != "prepare").map(|(_, ms)| ms);
-                trace.device_ms.extend((!spans.is_empty()).then(|| pass.sum::<f64>()));
+                trace.device_ms.extend((device > 0.0).then_some(device));
             }
+            run += 1;
         }
         trace.met = self.answers(kind, rays)?;
         Ok(trace)
     }
 
-    /// One timed submission: wall-clock milliseconds and the spans of its dispatches.
-    fn run(&self, kind: SetKind, queue: u32, rays: u32) -> Result<(f64, Vec<(&'static str, f64)>)> {
-        let Frame { renderer, kernels, bindings, buffers, .. } = &self.frame;
+    /// Puts rays into their queue and everything else to its start.
+    fn fill(&self, input: &Input) -> Result<()> {
+        let frame = &self.frame;
+        let mut commands = Commands::new(&frame.renderer.device, 0)?;
+        commands.copy(&input.counters, frame.buffer(binding::COUNTERS), 0, 4 * u64::from(COUNTERS));
+        commands.clear(frame.buffer(binding::RADIANCE));
+        if let Some(slot) = input.slot {
+            let target = frame.buffer(slot);
+            commands.copy(&input.items, target, 0, input.items.bytes.min(target.bytes));
+        }
+        let ones = frame.buffer(binding::SHADOW_RADIANCE);
+        commands.copy(&input.ones, ones, 0, input.ones.bytes.min(ones.bytes));
+        // Counters, radiance, queue: copies wrote, kernels of the next submission read and write.
+        commands.barrier(Access::Transfer, Access::ShaderReadWrite);
+        commands.submit_and_wait().map(drop)
+    }
+
+    /// One timed submission: wall-clock and device milliseconds.
+    fn run(&self, kind: SetKind, rays: u32) -> Result<(f64, f64)> {
+        let Frame { renderer, trace, bindings, .. } = &self.frame;
         let wave = Step { pixels: rays, samples: 1, finish: 1, ..Step::default() };
         let start = Instant::now();
-        let mut commands = Commands::new(&renderer.device, 2)?;
-        commands.bind(&kernels.primary, bindings);
-        let kernel = match kind {
-            SetKind::Primary => {
-                commands.dispatch(&kernels.primary, bytemuck::bytes_of(&wave), rays.div_ceil(WORKGROUP));
-                None
+        let mut commands = Commands::new(&renderer.device, 4)?;
+        commands.bind(&trace.primary, bindings);
+        let mut from_queue = |kernel: &Option<Arc<Kernel>>, queue: u32| {
+            if let Some(kernel) = kernel {
+                self.frame.prepare(&mut commands, &[queue]);
+                let arguments = self.frame.buffer(binding::DISPATCHES);
+                commands.dispatch_indirect(kernel, bytemuck::bytes_of(&wave), arguments, queue.into());
             }
-            SetKind::Shadow => kernels.shadow.as_ref(),
-            SetKind::Mirror | SetKind::Diffuse => kernels.reflection.as_ref(),
         };
-        if let Some(kernel) = kernel {
-            self.frame.prepare(&mut commands, 1 << queue);
-            let arguments = &buffers[binding::DISPATCHES as usize];
-            commands.dispatch_indirect(kernel, bytemuck::bytes_of(&wave), arguments, queue.into());
+        match kind {
+            SetKind::Primary => {
+                commands.dispatch(&trace.primary, bytemuck::bytes_of(&wave), rays.div_ceil(WORKGROUP));
+                self.frame.trace_again(&mut commands, wave, |again| Some(&again.primary));
+            }
+            SetKind::Shadow => {
+                from_queue(&trace.shadow, QUEUE_SHADOW);
+                self.frame.trace_again(&mut commands, wave, |again| again.shadow.as_ref());
+            }
+            SetKind::Mirror | SetKind::Diffuse => {
+                from_queue(&trace.reflection, QUEUE_REFLECTION);
+                self.frame.trace_again(&mut commands, wave, |again| again.reflection.as_ref());
+            }
         }
         // Queues, radiance, counters: kernels wrote, copies of the next submission read.
         commands.barrier(Access::ShaderWrite, Access::Transfer);
         let spans = commands.submit_and_wait()?;
-        Ok((start.elapsed().as_secs_f64() * 1e3, spans))
-    }
-
-    /// The queue that rays of this kind wait in, and its content.
-    fn items(&self, kind: SetKind, rays: &[BenchRay]) -> (u32, Vec<u8>) {
-        let origin = |ray: &BenchRay| (DVec3::from(Vec3::from(ray.origin)) - self.tree.center).as_vec3().into();
-        let rays = rays.iter().zip(0..);
-        match kind {
-            SetKind::Primary => (QUEUE_HIT, Vec::new()),
-            SetKind::Shadow => {
-                let items: Vec<_> = rays
-                    .map(|(ray, sample_index)| ShadowItem {
-                        sample_index,
-                        origin: origin(ray),
-                        direction: ray.direction,
-                        distance: ray.t_max,
-                        radiance: [1.0; 3],
-                    })
-                    .collect();
-                (QUEUE_SHADOW, bytemuck::cast_slice(&items).to_vec())
-            }
-            SetKind::Mirror | SetKind::Diffuse => {
-                let items: Vec<_> = rays
-                    .map(|(ray, sample_index)| ReflectionItem {
-                        sample_index,
-                        origin: origin(ray),
-                        direction: ray.direction,
-                        throughput: [1.0; 3],
-                    })
-                    .collect();
-                (QUEUE_REFLECTION, bytemuck::cast_slice(&items).to_vec())
-            }
-        }
+        let wall = start.elapsed().as_secs_f64() * 1e3;
+        Ok((wall, spans.iter().filter(|(name, _)| *name != "prepare").map(|(_, ms)| ms).sum()))
     }
 
     /// Reads what the last run left behind.
     fn answers(&self, kind: SetKind, rays: &[BenchRay]) -> Result<Vec<Met>> {
-        let buffers = &self.frame.buffers;
-        let counters = upload::read_back(self.frame.renderer, &buffers[binding::COUNTERS as usize])?;
-        let counters: &[u32] = bytemuck::cast_slice(counters.read()?);
-        super::frame::all_complete(counters)?;
+        let read_back = |slot| upload::read_back(self.frame.renderer, self.frame.buffer(slot));
         let mut met = vec![Met::Nothing; rays.len()];
         if kind == SetKind::Shadow {
-            let radiance = upload::read_back(self.frame.renderer, &buffers[binding::RADIANCE as usize])?;
+            let radiance = read_back(binding::RADIANCE)?;
             let radiance: &[[f32; 4]] = bytemuck::cast_slice(radiance.read()?);
             for (met, radiance) in met.iter_mut().zip(radiance) {
                 *met = if radiance[0] > 0.5 { Met::Nothing } else { Met::Something };
             }
             return Ok(met);
         }
+        let counters = read_back(binding::COUNTERS)?;
+        let counters: &[u32] = bytemuck::cast_slice(counters.read()?);
         let hits = counters[(COUNTER_FILLING + QUEUE_HIT) as usize] as usize;
-        let queue = upload::read_back(self.frame.renderer, &buffers[binding::HIT_QUEUE as usize])?;
+        let queue = read_back(binding::HIT_QUEUE)?;
         let items: &[HitItem] = bytemuck::cast_slice(&queue.read()?[..hits * size_of::<HitItem>()]);
         for item in items {
             let primitive = self.tree.bvh.order[item.triangle as usize];
@@ -208,5 +189,45 @@ impl Tracer<'_> {
             met[item.sample_index as usize] = Met::Triangle { t, primitive };
         }
         Ok(met)
+    }
+}
+
+/// What a set puts on the device before each run.
+struct Input {
+    /// The queue that its rays wait in; none for primary rays, which have no items.
+    slot: Option<u32>,
+    items: Buffer,
+    counters: Buffer,
+    /// What shadow rays add where they are not blocked.
+    ones: Buffer,
+}
+
+impl Input {
+    fn new(renderer: &Renderer, kind: SetKind, rays: &[BenchRay], center: DVec3) -> Result<Self> {
+        let item = |(ray, sample_index): (&BenchRay, u32)| RayItem {
+            origin: (DVec3::from(Vec3::from(ray.origin)) - center).as_vec3().into(),
+            sample_index,
+            direction: ray.direction,
+            distance: ray.t_max,
+        };
+        let queue = match kind {
+            SetKind::Primary => None,
+            SetKind::Shadow => Some((binding::SHADOW_QUEUE, QUEUE_SHADOW)),
+            SetKind::Mirror | SetKind::Diffuse => Some((binding::REFLECTION_QUEUE, QUEUE_REFLECTION)),
+        };
+        let mut counters = vec![0_u32; COUNTERS as usize];
+        let items: Vec<RayItem> = match queue {
+            Some((_, queue)) => {
+                counters[(COUNTER_FILLING + queue) as usize] = rays.len() as u32;
+                rays.iter().zip(0..).map(item).collect()
+            }
+            None => Vec::new(),
+        };
+        Ok(Self {
+            slot: queue.map(|(slot, _)| slot),
+            items: upload::staging(renderer, bytemuck::cast_slice(&items))?,
+            counters: upload::staging(renderer, bytemuck::cast_slice(&counters))?,
+            ones: upload::staging(renderer, bytemuck::cast_slice(&vec![[1.0_f32; 4]; rays.len()]))?,
+        })
     }
 }

@@ -1,6 +1,7 @@
 //! A soup's tree in the device's world.
 
 use crate::bvh::{Bvh, Quality};
+use crate::layout::{Features, STACK_REGISTERS};
 use crate::scene::Soup;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -22,5 +23,11 @@ impl Tree {
         let local = |corners: &[DVec3; 3]| corners.map(|corner| (corner - center).as_vec3());
         let triangles: Vec<[Vec3; 3]> = soup.positions.par_iter().map(local).collect();
         Self { bvh: Bvh::over_triangles(&triangles, quality), center, quality }
+    }
+
+    /// The features with what the tree itself needs.
+    pub fn features(&self, features: Features) -> Features {
+        let deep_tree = features.deep_tree || self.bvh.stats().depth > STACK_REGISTERS;
+        Features { deep_tree, ..features }
     }
 }

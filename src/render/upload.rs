@@ -40,14 +40,14 @@ impl Scene<'_> {
             binding::FRAME => make("frame", bytemuck::bytes_of(&self.frame()), Usage::Uniform),
             binding::MATERIALS => {
                 let materials: Vec<_> = self.scene.materials.iter().map(material).collect();
-                make("materials", bytemuck::cast_slice(&materials), Usage::Storage)
+                make("materials", bytemuck::cast_slice(&materials), Usage::Fetch)
             }
             binding::LIGHTS => {
                 let lights: Vec<_> = self.view.lights.iter().map(|light| self.light(light)).collect();
                 // The shade pass reads light 0 even where shadows are forced on without any: a dark one.
                 let lights = if lights.is_empty() { vec![layout::Light::default()] } else { lights };
                 let lights = if features.shadows { lights.as_slice() } else { &[] };
-                make("lights", bytemuck::cast_slice(lights), Usage::Storage)
+                make("lights", bytemuck::cast_slice(lights), Usage::Fetch)
             }
             _ => return None,
         })
@@ -127,6 +127,7 @@ impl Scene<'_> {
             range: light.range.map_or(FAR, |range| range as f32),
             spot_scale: spot_scale as f32,
             spot_offset: spot_offset as f32,
+            unused: [0.0; 3],
         }
     }
 }
@@ -147,12 +148,18 @@ fn material(material: &scene::Material) -> layout::Material {
         shininess: full.shininess as f32,
         mirror: constant.mirror.as_vec3().into(),
         mirror_tinted: (full.mirror - constant.mirror).as_vec3().into(),
+        unused: [0.0; 2],
     }
 }
 
 /// Makes the buffer of a slot that only the frame itself writes.
 pub(super) fn frame_buffer(renderer: &Renderer, slot: u32, name: &'static str, bytes: u64) -> Result<Buffer> {
-    let usage = if slot == binding::DISPATCHES { Usage::Indirect } else { Usage::Storage };
+    let is_viewed = binding::ALL.iter().any(|binding| binding.view_of == Some(slot));
+    let usage = match slot {
+        binding::DISPATCHES => Usage::Indirect,
+        _ if is_viewed => Usage::FetchedStorage,
+        _ => Usage::Storage,
+    };
     Buffer::new(&renderer.device, name, bytes, usage, Memory::Device)
 }
 

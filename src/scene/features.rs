@@ -25,5 +25,8 @@ pub fn of(scene: &Scene, soup: &Soup, view: &View) -> Features {
         shadows,
         reflections: mirror && view.max_depth > 0,
         multisampling: view.samples > 1,
+        // These are the renderer's to know.
+        deep_tree: false,
+        retrace: false,
     }
 }

@@ -18,6 +18,8 @@ pub enum Usage {
     Fetch,
     /// A storage buffer.
     Storage,
+    /// A storage buffer that later passes read as [`Usage::Fetch`].
+    FetchedStorage,
     /// A storage buffer that also holds the arguments of indirect dispatches.
     Indirect,
     /// A uniform buffer.
@@ -53,10 +55,13 @@ impl Buffer {
     /// # Errors
     /// `Device` when it is larger than the device can bind; `Vulkan` or `Device` when there is no memory for it.
     pub fn new(device: &Arc<Device>, name: &'static str, bytes: u64, usage: Usage, memory: Memory) -> Result<Self> {
-        let texels = usage == Usage::Fetch && device.fetch == Fetch::Texel;
-        let bytes = padded(bytes, usage == Usage::Fetch);
+        let fetched = matches!(usage, Usage::Fetch | Usage::FetchedStorage);
+        let texels = fetched && device.fetch == Fetch::Texel;
+        let bytes = padded(bytes, fetched);
+        let most_texel_bytes = u64::from(device.info.max_texels) * TEXEL;
         let limit = match usage {
-            _ if texels => u64::from(device.info.max_texels) * TEXEL,
+            Usage::Fetch if texels => most_texel_bytes,
+            Usage::FetchedStorage if texels => most_texel_bytes.min(device.info.max_storage_bytes),
             Usage::Uniform => 16384,
             _ => device.info.max_storage_bytes,
         };
@@ -68,7 +73,10 @@ impl Buffer {
         }
         let kind = match usage {
             Usage::Fetch if texels => vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
-            Usage::Fetch | Usage::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
+            Usage::FetchedStorage if texels => {
+                vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+            }
+            Usage::Fetch | Usage::Storage | Usage::FetchedStorage => vk::BufferUsageFlags::STORAGE_BUFFER,
             Usage::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
             Usage::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
         };

@@ -54,8 +54,8 @@ pub struct Commands {
     buffer: vk::CommandBuffer,
     fence: vk::Fence,
     timestamps: vk::QueryPool,
-    /// Name of each dispatch, whose end timestamp has the next index.
-    timed: Vec<&'static str>,
+    /// Name of each dispatch; the end timestamp of the first `most_timed` has the next index.
+    dispatched: Vec<&'static str>,
     most_timed: usize,
 }
 
@@ -73,7 +73,7 @@ impl Commands {
             buffer: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
             timestamps: vk::QueryPool::null(),
-            timed: Vec::with_capacity(most_timed),
+            dispatched: Vec::new(),
             most_timed,
         };
         let raw = &device.raw;
@@ -157,9 +157,9 @@ impl Commands {
         // SAFETY: recording; the bytes are exactly the layout's push constants.
         unsafe { self.device.raw.cmd_push_constants(self.buffer, kernel.layout(), stage, 0, push) };
         dispatch(self);
-        if self.timed.len() < self.most_timed {
-            self.timed.push(kernel.name);
-            self.write_timestamp(self.timed.len() as u32);
+        self.dispatched.push(kernel.name);
+        if self.dispatched.len() <= self.most_timed {
+            self.write_timestamp(self.dispatched.len() as u32);
         }
         if let Some(utils) = &self.device.utils {
             // SAFETY: recording; ends the label begun above.
@@ -189,7 +189,7 @@ impl Commands {
         unsafe { self.device.raw.cmd_copy_buffer(self.buffer, from.raw, to.raw, &region) };
     }
 
-    /// Runs what was recorded, waits, and returns each timed dispatch's name and milliseconds, in order.
+    /// Runs what was recorded, waits, and returns each dispatch's name and milliseconds, in order; 0 where it was not timed.
     ///
     /// # Errors
     /// `Vulkan` when the device is lost or out of memory.
@@ -210,16 +210,19 @@ impl Commands {
     }
 
     fn read_timestamps(&self) -> Result<Vec<(&'static str, f64)>> {
+        let mut spans: Vec<_> = self.dispatched.iter().map(|name| (*name, 0.0)).collect();
         let Some(period) = self.device.timestamp_period.filter(|_| self.most_timed > 0) else {
-            return Ok(Vec::new());
+            return Ok(spans);
         };
-        let mut ticks = vec![0_u64; self.timed.len() + 1];
+        let mut ticks = vec![0_u64; spans.len().min(self.most_timed) + 1];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: the queries were written by commands that have completed.
         unsafe { self.device.raw.get_query_pool_results(self.timestamps, 0, &mut ticks, flags) }
             .map_err(failed("read timestamps"))?;
-        let spans = ticks.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * period * 1e-6);
-        Ok(self.timed.iter().copied().zip(spans).collect())
+        for ((_, ms), pair) in spans.iter_mut().zip(ticks.windows(2)) {
+            *ms = pair[1].saturating_sub(pair[0]) as f64 * period * 1e-6;
+        }
+        Ok(spans)
     }
 }
 
