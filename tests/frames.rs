@@ -2,6 +2,7 @@
 
 use super::support::{assert_alike, draw, draw_reference, renderer, storage_renderer};
 use glam::{DMat4, DVec3, Vec3};
+use glimt::bvh::Quality;
 use glimt::scene::{
     built_in, shapes, Background, CameraChoice, Instance, Light, LightKind, Material, Mesh, Soup, Whitted, BUILT_IN,
 };
@@ -243,6 +244,43 @@ fn single_sided_triangles_are_seen_from_the_front_but_shade_from_both() {
         draw(&scene, &options).0.pixels[36][3]
     };
     assert_eq!((middle(3.0), middle(-3.0)), (1.0, 0.0));
+}
+
+#[test]
+fn rays_that_overflow_their_stack_are_traced_again() {
+    // Needles that pass by one point: most boxes hold it, so that rays near it enter both children of most nodes.
+    let mut needles = Mesh::default();
+    for index in 0..4096_u32 {
+        let (height, angle) = (1.0 - 2.0 * (index as f32 + 0.5) / 4096.0, 2.399_963 * index as f32);
+        let radius = (1.0 - height * height).sqrt();
+        let direction = Vec3::new(radius * angle.cos(), height, radius * angle.sin());
+        let across = direction.any_orthonormal_vector();
+        let center = across.cross(direction) * (index as f32 * 0.618_034).fract() * 0.2;
+        needles.triangles.push([0, 1, 2].map(|corner| 3 * index + corner));
+        needles.positions.extend([direction, -direction, across * 0.01].map(|corner| center + corner));
+    }
+    let mirror = Material { double_sided: true, ..exact(0.2, 0.5, 0.2, 20.0, 0.3) };
+    let light = Light::point(DVec3::new(3.0, 4.0, 5.0), DVec3::splat(60.0));
+    let scene = scene_of(vec![(needles, DMat4::IDENTITY, mirror)], vec![light]);
+    let camera = look(DVec3::new(0.5, 0.4, 2.5), DVec3::ZERO);
+    let options = Options { camera, max_depth: 1, size: (80, 60), bvh: Some(Quality::Fast), ..Options::default() };
+    // Where needles all but touch, shadows and reflections are a matter of rounding: the reference judges the first hits.
+    let dark = Scene { lights: Vec::new(), ..scene.clone() };
+    let first_hits = Options { max_depth: 0, ..options.clone() };
+    assert_alike("needles", &draw_reference(&dark, &first_hits), &draw(&dark, &first_hits).0);
+    let (film, report) = draw(&scene, &options);
+    let other_tree = Options { bvh: Some(Quality::Best), ..options.clone() };
+    assert_eq!(film, draw(&scene, &other_tree).0, "the tree's shape never shows");
+    let retraced = report.passes.iter().find(|pass| pass.name == "retrace").expect("rays are traced again");
+    println!("needles: {} rays traced again in {} dispatches", retraced.items, retraced.dispatches);
+    assert!(retraced.items > 100);
+    // In several waves, of which only the first is run twice.
+    let waves = Options { samples_in_flight: 640, samples: 3, ..options.clone() };
+    assert_eq!(draw(&scene, &waves).0, draw(&scene, &Options { samples: 3, ..options.clone() }).0);
+    assert_eq!(film, storage_renderer().render(&scene, &options).unwrap().0);
+    // A flat tree has no such need: the queue is left out.
+    let flat = draw(&built_in("cornell").unwrap(), &small()).1;
+    assert!(!flat.features["deep_tree"] && flat.passes.iter().all(|pass| pass.name != "retrace"));
 }
 
 #[test]
