@@ -6,8 +6,8 @@
 
 const int NOTHING = int(0x80000000); // no node: the stack is empty
 const int REGISTERS = int(STACK_REGISTERS);
-/// Nodes after which a walk is given up: far more than any driver's own limit, see Budget.
-const uint MOST_ROUNDS = 1u << 20u;
+/// A node that no tree has. Every loop here also ends at it, see check_complete.
+const int IMPOSSIBLE = 0x7fffffff;
 
 /// The ray in grid coordinates, where a child's u16 box is compared without decoding it.
 struct GridRay {
@@ -43,83 +43,78 @@ struct Visit {
     int farther;
 };
 
-Visit visit(GridRay ray, int node, float t_max) {
+/// The nearer of two that are entered comes first, unless any hit will do.
+Visit visit(GridRay ray, int node, float t_max, bool any) {
     uvec4 child_0 = FETCH(nodes, uint(node) * NODE_TEXELS);
     uvec4 child_1 = FETCH(nodes, uint(node) * NODE_TEXELS + 1u);
     float entry_0;
     float entry_1;
     bool enters_0 = enters(ray, child_0, t_max, entry_0);
     bool enters_1 = enters(ray, child_1, t_max, entry_1);
-    bool swapped = enters_1 && (!enters_0 || entry_1 < entry_0);
+    bool swapped = any ? !enters_0 : enters_1 && (!enters_0 || entry_1 < entry_0);
     return Visit(enters_0 && enters_1, !(enters_0 || enters_1),
                  int(swapped ? child_1.w : child_0.w), int(swapped ? child_0.w : child_1.w));
 }
 
-/// What one invocation may still do, and whether it was stopped.
-///
-/// Mesa 22.3 silently ends every loop when one invocation, or another in its subgroup, has made 65 535 rounds, nested loops
-/// added up. So every loop here has a second way out, by a count of nodes: only then does the compiler not take for granted
-/// that a loop ended as it should, and what is left to do behind the loop tells whether it was cut short.
-struct Budget {
-    /// Nodes visited.
-    uint rounds;
-    bool cut;
-};
-
 /// Tests the triangles of a leaf. A leaf's reference is ~(first · 16 + count).
-bool visit_leaf(ShearedRay ray, int leaf, bool culls, inout Budget budget, inout Hit hit) {
+bool visit_leaf(ShearedRay ray, int leaf, bool culls, inout bool cut, inout Hit hit) {
     uint reference = uint(~leaf);
     uint triangle = reference >> 4u;
     uint end = triangle + (reference & 15u);
     bool found = false;
-    while (triangle < end && budget.rounds < MOST_ROUNDS) {
+    while (triangle < end && triangle != uint(IMPOSSIBLE)) {
         found = intersect_triangle(ray, triangle, culls, hit) || found;
         triangle++;
     }
-    budget.cut = budget.cut || triangle < end;
+    cut = cut || triangle < end;
     return found;
 }
 
 /// Counts a ray whose walk was cut short. The host turns a count above zero into an error: a wrong picture is never written.
-void check_complete(int node, Budget budget) {
-    if (node != NOTHING || budget.cut)
+///
+/// Mesa 22.3 silently ends every loop when one invocation, or another in its subgroup, has made 65 535 rounds, nested loops
+/// added up. So every loop here has a second way out, which is never taken: only then does the compiler not take for granted
+/// that a loop ended as it should, and what is left to do behind the loop tells whether it was cut short.
+void check_complete(int node, bool cut) {
+    if (node != NOTHING || cut)
         atomicAdd(counters[COUNTER_LOST], 1u);
 }
 
 /// The walk with an array for a stack, as deep as any tree.
-void traverse_deep(GridRay grid, ShearedRay ray, bool any, Budget budget, inout Hit hit) {
+void traverse_deep(GridRay grid, ShearedRay ray, bool any, inout Hit hit) {
+    bool cut = false;
     int stack[MAX_TREE_DEPTH];
     int height = 0;
     int node = 0;
-    while (node != NOTHING && budget.rounds < MOST_ROUNDS) {
+    while (node != NOTHING && node != IMPOSSIBLE) {
         bool found = false;
         if (node >= 0) {
-            budget.rounds++;
-            Visit next = visit(grid, node, hit.t);
+            Visit next = visit(grid, node, hit.t, any);
             if (next.both)
                 stack[height++] = next.farther;
             node = next.nearer;
             if (!next.none)
                 continue;
         } else {
-            found = visit_leaf(ray, node, SINGLE_SIDED && !any, budget, hit);
+            found = visit_leaf(ray, node, SINGLE_SIDED && !any, cut, hit);
         }
         node = height > 0 && !(any && found) ? stack[--height] : NOTHING;
     }
-    check_complete(node, budget);
+    check_complete(node, cut);
 }
 
 /// The walk with registers for a stack; false if it overflowed and is worth nothing.
-bool traverse_shallow(GridRay grid, ShearedRay ray, bool any, Budget budget, inout Hit hit) {
+bool traverse_shallow(GridRay grid, ShearedRay ray, bool any, inout Hit hit) {
+    bool cut = false;
     int stack[REGISTERS];
     [[unroll]] for (int i = 0; i < REGISTERS; i++)
         stack[i] = NOTHING;
     int overflow = 0;
     int node = 0;
-    while (node != NOTHING && budget.rounds < MOST_ROUNDS) {
-        while (node >= 0 && budget.rounds < MOST_ROUNDS) {
-            budget.rounds++;
-            Visit next = visit(grid, node, hit.t);
+    while (node != NOTHING) {
+        // An inner node, and not IMPOSSIBLE.
+        while (uint(node) < uint(IMPOSSIBLE)) {
+            Visit next = visit(grid, node, hit.t, any);
             node = next.none ? stack[0] : next.nearer;
             if (DEEP_TREE)
                 overflow |= next.both ? stack[REGISTERS - 1] ^ NOTHING : 0;
@@ -136,7 +131,7 @@ bool traverse_shallow(GridRay grid, ShearedRay ray, bool any, Budget budget, ino
         }
         if (node >= 0 || node == NOTHING)
             break;
-        bool found = visit_leaf(ray, node, SINGLE_SIDED && !any, budget, hit);
+        bool found = visit_leaf(ray, node, SINGLE_SIDED && !any, cut, hit);
         node = stack[0];
         [[unroll]] for (int i = 0; i < REGISTERS - 1; i++)
             stack[i] = stack[i + 1];
@@ -146,7 +141,7 @@ bool traverse_shallow(GridRay grid, ShearedRay ray, bool any, Budget budget, ino
             overflow = 0;
         }
     }
-    check_complete(node, budget);
+    check_complete(node, cut);
     return overflow == 0;
 }
 
@@ -155,12 +150,11 @@ bool traverse_shallow(GridRay grid, ShearedRay ray, bool any, Budget budget, ino
 bool traverse(Ray world_ray, bool any, inout Hit hit) {
     GridRay grid = grid_ray(world_ray);
     ShearedRay ray = shear_ray(world_ray);
-    Budget budget = Budget(0u, false);
     if (RETRACE) {
-        traverse_deep(grid, ray, any, budget, hit);
+        traverse_deep(grid, ray, any, hit);
         return true;
     }
-    return traverse_shallow(grid, ray, any, budget, hit);
+    return traverse_shallow(grid, ray, any, hit);
 }
 
 /// No hit yet, and none wanted beyond `distance`.
