@@ -3,7 +3,7 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use criterion::{criterion_group, criterion_main, Criterion};
-use glimt::bvh::{quantise, Aabb, Bvh};
+use glimt::bvh::{quantise, reference, Aabb, Bvh};
 use glimt::scene::{built_in, shapes, Instance, Material, Soup};
 use glimt::Scene;
 
@@ -30,7 +30,9 @@ fn host(criterion: &mut Criterion) {
     group.sample_size(10);
     group.bench_function("soup", |bencher| bencher.iter(|| Soup::of(&scene).unwrap()));
     group.bench_function("build", |bencher| bencher.iter(|| Bvh::build(&boxes)));
-    group.bench_function("quantise", |bencher| bencher.iter(|| quantise(&bvh, glam::Vec3::ONE)));
+    group.bench_function("quantise", |bencher| {
+        bencher.iter(|| quantise(&bvh, glam::Vec3::ONE, |child| reference(child, 0, 0)))
+    });
     group.finish();
     criterion.bench_function("built-in table", |bencher| bencher.iter(|| built_in("table").unwrap()));
 }

@@ -1,6 +1,7 @@
 #version 460
 #include "shared/kernel.glsl"
 #include "shared/queue.glsl"
+#include "shared/texels.glsl"
 #include "shared/random.glsl"
 #include "shared/intersect.glsl"
 #include "shared/traverse.glsl"
@@ -56,5 +57,5 @@ void main() {
     bool is_hit = hit.triangle != NO_TRIANGLE;
     radiance[sample_index] = is_hit ? vec4(0.0, 0.0, 0.0, 1.0) : vec4(background(ray.direction), frame.background_alpha);
     if (is_hit)
-        hit_queue[queue_append(QUEUE_HIT)] = HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, 0u);
+        hit_queue[queue_append(QUEUE_HIT)] = HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, hit.instance);
 }

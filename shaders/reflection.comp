@@ -19,7 +19,7 @@ void main() {
     }
     if (hit.triangle != NO_TRIANGLE) {
         hit_queue[queue_append(QUEUE_HIT)] =
-            HitItem(item.sample_index, hit.triangle, hit.barycentrics, item.direction, 0u);
+            HitItem(item.sample_index, hit.triangle, hit.barycentrics, item.direction, hit.instance);
     } else {
         vec3 factor = FETCH_FLOATS(throughputs, item.sample_index).rgb;
         add_radiance(item.sample_index, factor * background(item.direction));

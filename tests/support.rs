@@ -1,6 +1,7 @@
 //! What several tests need.
 
 use glimt::render::Renderer;
+use glimt::scene::Instancing;
 use glimt::vulkan::{DeviceChoice, Fetch, Habits};
 use glimt::{film, reference, render, Film, Options, Report, Scene};
 use std::path::{Path, PathBuf};
@@ -31,6 +32,7 @@ pub fn draw(scene: &Scene, options: &Options) -> (Film, Report) {
 
 /// Renders by the reference.
 pub fn draw_reference(scene: &Scene, options: &Options) -> Film {
+    let options = &Options { instancing: Instancing::Flat, ..options.clone() };
     let prepared = render::Prepared::new(scene, options).unwrap();
     reference::render(scene, &prepared.soup, &prepared.view, &options.interrupted, None).unwrap()
 }

@@ -26,37 +26,39 @@ FETCH_BUFFER(3, colors)
 FETCH_BUFFER(4, materials)
 /// Lights, LIGHT_TEXELS each.
 FETCH_BUFFER(5, lights)
+/// Instances, INSTANCE_TEXELS each, in the order of the upper tree's leaves.
+FETCH_BUFFER(6, instances)
 /// Camera, picture, background, grid.
-UNIFORM_BUFFER(6, Frame, frame)
+UNIFORM_BUFFER(7, Frame, frame)
 /// Hits to shade.
-STORAGE_BUFFER(7, HitItem, hit_queue)
+STORAGE_BUFFER(8, HitItem, hit_queue)
 /// The same, to be read.
-FETCH_VIEW(8, hit_items, hit_queue)
+FETCH_VIEW(9, hit_items, hit_queue)
 /// Shadow rays to trace.
-STORAGE_BUFFER(9, RayItem, shadow_queue)
+STORAGE_BUFFER(10, RayItem, shadow_queue)
 /// The same, to be read.
-FETCH_VIEW(10, shadow_items, shadow_queue)
+FETCH_VIEW(11, shadow_items, shadow_queue)
 /// Reflected rays to trace.
-STORAGE_BUFFER(11, RayItem, reflection_queue)
+STORAGE_BUFFER(12, RayItem, reflection_queue)
 /// The same, to be read.
-FETCH_VIEW(12, reflection_items, reflection_queue)
+FETCH_VIEW(13, reflection_items, reflection_queue)
 /// Rays to trace again: pixel samples, or places in the queue that they came from.
-STORAGE_BUFFER(13, uint, retrace_queue)
+STORAGE_BUFFER(14, uint, retrace_queue)
 /// Counts of the queues' items; lost rays.
-STORAGE_BUFFER(14, uint, counters)
+STORAGE_BUFFER(15, uint, counters)
 /// Arguments of the indirect dispatches, one a queue.
-STORAGE_BUFFER(15, Dispatch, dispatches)
+STORAGE_BUFFER(16, Dispatch, dispatches)
 /// What each pixel sample's shadow ray adds if nothing blocks it.
-STORAGE_BUFFER(16, vec4, shadow_radiance)
+STORAGE_BUFFER(17, vec4, shadow_radiance)
 /// The same, to be read.
-FETCH_VIEW(17, shadow_radiances, shadow_radiance)
+FETCH_VIEW(18, shadow_radiances, shadow_radiance)
 /// Product of the mirror coefficients on each pixel sample's way.
-STORAGE_BUFFER(18, vec4, throughput)
+STORAGE_BUFFER(19, vec4, throughput)
 /// The same, to be read.
-FETCH_VIEW(19, throughputs, throughput)
+FETCH_VIEW(20, throughputs, throughput)
 /// Radiance of each pixel sample in flight, alpha = coverage.
-STORAGE_BUFFER(20, vec4, radiance)
+STORAGE_BUFFER(21, vec4, radiance)
 /// Sum, at the end mean, of each pixel's samples in the band.
-STORAGE_BUFFER(21, vec4, film)
+STORAGE_BUFFER(22, vec4, film)
 
 PUSH_CONSTANTS(Step, step_now)

@@ -17,5 +17,7 @@ layout(constant_id = 5) const bool REFLECTIONS = true;
 layout(constant_id = 6) const bool MULTISAMPLING = true;
 /// The tree is deeper than the traversal's stack: a ray may have to be traced again.
 layout(constant_id = 7) const bool DEEP_TREE = true;
+/// Instances share meshes: an upper tree over instances, whose leaves are trees over the triangles of a mesh.
+layout(constant_id = 8) const bool INSTANCES = true;
 /// The kernel traces again what overflowed, with a stack as deep as any tree: a variant, not a need of the scene.
-layout(constant_id = 8) const bool RETRACE = true;
+layout(constant_id = 9) const bool RETRACE = true;

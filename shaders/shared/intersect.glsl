@@ -19,6 +19,8 @@ struct Hit {
     uint primitive;
     /// λ2, λ3.
     vec2 barycentrics;
+    /// Instance; decides before the primitive.
+    uint instance;
 };
 
 /// A ray prepared for the triangle test. Axes are rotated so that z is the direction's largest component.
@@ -41,7 +43,7 @@ ShearedRay shear_ray(Ray ray) {
 }
 
 /// Takes the triangle as the new hit if it is nearer than the old one.
-bool intersect_triangle(ShearedRay ray, uint triangle, bool culls, inout Hit hit) {
+bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool culls, inout Hit hit) {
     uint first = triangle * TRIANGLE_TEXELS;
     uvec4 texel_a = FETCH(triangles, first);
     uvec4 texel_b = FETCH(triangles, first + 1u);
@@ -62,9 +64,10 @@ bool intersect_triangle(ShearedRay ray, uint triangle, bool culls, inout Hit hit
     precise float t = (u * a.z + v * b.z + w * c.z) * ray.shear.z / det;
     // det and 1/z have the same sign when the ray meets the front face.
     bool culled = culls && (texel_c.w & TRIANGLE_SINGLE_SIDED) != 0u && (det < 0.0) != (ray.shear.z < 0.0);
-    bool nearer = t < hit.t || (t == hit.t && texel_a.w < hit.primitive);
+    bool is_first = INSTANCES && instance != hit.instance ? instance < hit.instance : texel_a.w < hit.primitive;
+    bool nearer = t < hit.t || (t == hit.t && is_first);
     if (inside && det != 0.0 && t > 0.0 && nearer && !culled) {
-        hit = Hit(t, triangle, texel_a.w, vec2(v, w) / det);
+        hit = Hit(t, triangle, texel_a.w, vec2(v, w) / det, instance);
         return true;
     }
     return false;

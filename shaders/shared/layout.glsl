@@ -11,7 +11,9 @@ const uint MAX_TREE_DEPTH = 64u;
 /// Nodes that the traversal's stack of registers holds.
 const uint STACK_REGISTERS = 10u;
 /// Most triangles in a leaf that its 32-bit reference can name.
-const uint MAX_LEAF_TRIANGLES = 15u;
+const uint MAX_LEAF_TRIANGLES = 14u;
+/// In place of a leaf's number of triangles: it is an instance.
+const uint LEAF_IS_INSTANCE = 15u;
 /// Texels (16 bytes) in one tree node: a record for each of its two children.
 const uint NODE_TEXELS = 2u;
 /// Texels in one triangle of the traversal, and in one triangle's normals or colours.
@@ -20,6 +22,8 @@ const uint TRIANGLE_TEXELS = 3u;
 const uint MATERIAL_TEXELS = 6u;
 /// Texels in a Light.
 const uint LIGHT_TEXELS = 4u;
+/// Texels in an Instance.
+const uint INSTANCE_TEXELS = 8u;
 /// Texels in a HitItem or a RayItem.
 const uint ITEM_TEXELS = 2u;
 
@@ -163,6 +167,30 @@ struct Light {
     vec3 unused;
 };
 
+/// A part of the scene somewhere in the world: a lower tree in its own space. Whole texels.
+struct Instance {
+    /// Row of the affine matrix from world to part.
+    vec4 part_from_world_x;
+    /// Second row.
+    vec4 part_from_world_y;
+    /// Third row.
+    vec4 part_from_world_z;
+    /// Position of quantised coordinate 0 in the part's space.
+    vec3 grid_origin;
+    /// Reference of the lower tree's root: a node or a leaf.
+    uint root;
+    /// Quanta per unit of the part's space.
+    vec3 grid_scale;
+    /// By how much both transforms, one after the other, may enlarge rounding errors: the norm of |world_from_part|·|part_from_world|; 0 where both leave everything as it is.
+    float condition;
+    /// Row of the affine matrix from part to world.
+    vec4 world_from_part_x;
+    /// Second row.
+    vec4 world_from_part_y;
+    /// Third row.
+    vec4 world_from_part_z;
+};
+
 /// A hit to be shaded. Whole texels.
 struct HitItem {
     /// Pixel sample.
@@ -173,8 +201,8 @@ struct HitItem {
     vec2 barycentrics;
     /// Unit direction of the ray that hit.
     vec3 direction;
-    /// Fills the texel.
-    uint unused;
+    /// Instance that the triangle belongs to; 0 in a flat scene.
+    uint instance;
 };
 
 /// A ray to be traced: to a light, or reflected. Whole texels.

@@ -17,6 +17,41 @@ vec3 interpolate(vec3 weights, uvec4 a, uvec4 b, uvec4 c) {
     return weights.x * uintBitsToFloat(a.xyz) + weights.y * uintBitsToFloat(b.xyz) + weights.z * uintBitsToFloat(c.xyz);
 }
 
+/// The linear part of an instance's transform to the world, column by column.
+mat3 world_from_part(uint instance) {
+    uint first = instance * INSTANCE_TEXELS + 5u;
+    return transpose(mat3(FETCH_FLOATS(instances, first).xyz, FETCH_FLOATS(instances, first + 1u).xyz,
+                          FETCH_FLOATS(instances, first + 2u).xyz));
+}
+
+/// The power of two at or below the largest component: dividing by it is exact and keeps products from vanishing.
+float magnitude_of(vec3 size) {
+    return uintBitsToFloat(floatBitsToUint(max(size.x, max(size.y, size.z))) & 0x7f800000u);
+}
+
+/// A normal of a part, of any length, in the world, of another length: by the cofactors, whose sign is the determinant's, so that
+/// mirrored normals stay on the front.
+vec3 world_normal(uint instance, vec3 normal) {
+    mat3 m = world_from_part(instance);
+    m /= magnitude_of(max(abs(m[0]), max(abs(m[1]), abs(m[2]))));
+    vec3 x = cross(m[1], m[2]);
+    vec3 world = mat3(x, cross(m[2], m[0]), cross(m[0], m[1])) * normal;
+    return (dot(m[0], x) < 0.0 ? -world : world) / magnitude_of(abs(world));
+}
+
+/// Moves a position and its error from the space of an instance's part to the world. What the ray lost on its way into that
+/// space is as much as what is lost on the way back, times the transforms' condition.
+void place_in_world(uint instance, float condition, vec3 magnitude, inout Surface surface) {
+    uint first = instance * INSTANCE_TEXELS;
+    vec4 x = FETCH_FLOATS(instances, first + 5u);
+    vec4 y = FETCH_FLOATS(instances, first + 6u);
+    vec4 z = FETCH_FLOATS(instances, first + 7u);
+    vec3 offset = vec3(x.w, y.w, z.w);
+    surface.position = surface.position * mat3(x.xyz, y.xyz, z.xyz) + offset;
+    vec3 world = magnitude * mat3(abs(x.xyz), abs(y.xyz), abs(z.xyz)) + abs(offset);
+    surface.error = 9.6e-7 * condition * max(world.x, max(world.y, world.z));
+}
+
 Surface surface_at(HitItem item) {
     uint first = item.triangle * TRIANGLE_TEXELS;
     uvec4 texel_a = FETCH(triangles, first);
@@ -36,16 +71,31 @@ Surface surface_at(HitItem item) {
     surface.position = weights.x * a + weights.y * b + weights.z * c;
     vec3 magnitude = abs(weights.x * a) + abs(weights.y * b) + abs(weights.z * c);
     surface.error = 9.6e-7 * max(magnitude.x, max(magnitude.y, magnitude.z));
+    // A condition of 0 means that the part lies in the world already.
+    float condition = INSTANCES ? FETCH_FLOATS(instances, item.instance * INSTANCE_TEXELS + 4u).w : 0.0;
+    bool is_placed = INSTANCES && condition > 0.0;
+    if (is_placed)
+        place_in_world(item.instance, condition, magnitude, surface);
     // Edges are brought to size 1 first, so that tiny or huge triangles neither underflow nor overflow.
     vec3 edge_b = b - a;
     vec3 edge_c = c - a;
     float size_b = max(abs(edge_b.x), max(abs(edge_b.y), abs(edge_b.z)));
     float size_c = max(abs(edge_c.x), max(abs(edge_c.y), abs(edge_c.z)));
-    surface.geometric_normal = normalize(cross(edge_b / size_b, edge_c / size_c));
+    vec3 across = cross(edge_b / size_b, edge_c / size_c);
+    surface.geometric_normal = normalize(is_placed ? world_normal(item.instance, across) : across);
     surface.normal = surface.geometric_normal;
-    if (SMOOTH_NORMALS && (flags & TRIANGLE_SMOOTH) != 0u)
-        surface.normal = normalize(interpolate(weights, FETCH(normals, attributes), FETCH(normals, attributes + 1u),
-                                               FETCH(normals, attributes + 2u)));
+    if (SMOOTH_NORMALS && (flags & TRIANGLE_SMOOTH) != 0u) {
+        vec3 na = FETCH_FLOATS(normals, attributes).xyz;
+        vec3 nb = FETCH_FLOATS(normals, attributes + 1u).xyz;
+        vec3 nc = FETCH_FLOATS(normals, attributes + 2u).xyz;
+        if (is_placed) {
+            // Unit in the world before they are interpolated, as in a flat scene, where the host sees to it.
+            na = normalize(world_normal(item.instance, na));
+            nb = normalize(world_normal(item.instance, nb));
+            nc = normalize(world_normal(item.instance, nc));
+        }
+        surface.normal = normalize(weights.x * na + weights.y * nb + weights.z * nc);
+    }
     if (dot(surface.geometric_normal, item.direction) > 0.0) {
         surface.geometric_normal = -surface.geometric_normal;
         surface.normal = -surface.normal;

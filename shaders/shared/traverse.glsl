@@ -4,7 +4,10 @@
 // the ray goes to the retrace queue, where a variant of the same kernel walks again with an array as deep as the tree can be:
 // rare, and no ray is ever lost.
 
-const int NOTHING = int(0x80000000); // no node: the stack is empty
+/// No node: the stack is empty.
+const int NOTHING = int(0x80000000);
+/// On the stack where an instance was entered: back to the world.
+const int LEAVE = int(0x80000001);
 const int REGISTERS = int(STACK_REGISTERS);
 /// A node that no tree has. Every loop here also ends at it, see check_complete.
 const int IMPOSSIBLE = 0x7fffffff;
@@ -15,10 +18,10 @@ struct GridRay {
     vec3 inverse;
 };
 
-GridRay grid_ray(Ray ray) {
+GridRay grid_ray(Ray ray, vec3 grid_origin, vec3 grid_scale) {
     // A zero component would make 0 · ∞ = NaN and drop a box; 1e-20 stays finite on any grid.
     vec3 direction = mix(ray.direction, vec3(1e-20), lessThan(abs(ray.direction), vec3(1e-20)));
-    return GridRay((ray.origin - frame.grid_origin) * frame.grid_scale, 1.0 / (direction * frame.grid_scale));
+    return GridRay((ray.origin - grid_origin) * grid_scale, 1.0 / (direction * grid_scale));
 }
 
 /// Slab test against a child's box. Distances are compared as integers, which orders them like floats because entry ≥ 0.
@@ -56,17 +59,56 @@ Visit visit(GridRay ray, int node, float t_max, bool any) {
                  int(swapped ? child_1.w : child_0.w), int(swapped ? child_0.w : child_1.w));
 }
 
+/// Where a walk is: in the world's tree, or, with INSTANCES, in the tree of an instance, with the ray in its space. The ray's
+/// parameter t is the same in all spaces, because directions are transformed and not normalised.
+struct Walk {
+    GridRay grid;
+    ShearedRay ray;
+    uint instance;
+    bool cut;
+};
+
+Walk begin_walk(Ray world_ray) {
+    return Walk(grid_ray(world_ray, frame.grid_origin, frame.grid_scale), shear_ray(world_ray), 0u, false);
+}
+
+/// A leaf of the upper tree: ~(instance · 16 + LEAF_IS_INSTANCE).
+bool is_instance(int node) {
+    return INSTANCES && node < 0 && node != NOTHING && (uint(~node) & 15u) == LEAF_IS_INSTANCE;
+}
+
+/// Goes on in the instance's space and returns the root of its tree.
+int enter_instance(inout Walk walk, Ray world_ray, int leaf) {
+    walk.instance = uint(~leaf) >> 4u;
+    uint first = walk.instance * INSTANCE_TEXELS;
+    vec4 x = FETCH_FLOATS(instances, first);
+    vec4 y = FETCH_FLOATS(instances, first + 1u);
+    vec4 z = FETCH_FLOATS(instances, first + 2u);
+    uvec4 origin_and_root = FETCH(instances, first + 3u);
+    vec3 grid_scale = FETCH_FLOATS(instances, first + 4u).xyz;
+    mat3 rows = mat3(x.xyz, y.xyz, z.xyz);
+    Ray ray = Ray(world_ray.origin * rows + vec3(x.w, y.w, z.w), world_ray.direction * rows);
+    walk.grid = grid_ray(ray, uintBitsToFloat(origin_and_root.xyz), grid_scale);
+    walk.ray = shear_ray(ray);
+    return int(origin_and_root.w);
+}
+
+/// Goes on in the world.
+void leave_instance(inout Walk walk, Ray world_ray) {
+    walk.grid = grid_ray(world_ray, frame.grid_origin, frame.grid_scale);
+}
+
 /// Tests the triangles of a leaf. A leaf's reference is ~(first · 16 + count).
-bool visit_leaf(ShearedRay ray, int leaf, bool culls, inout bool cut, inout Hit hit) {
+bool visit_leaf(inout Walk walk, int leaf, bool any, inout Hit hit) {
     uint reference = uint(~leaf);
     uint triangle = reference >> 4u;
     uint end = triangle + (reference & 15u);
     bool found = false;
     while (triangle < end && triangle != uint(IMPOSSIBLE)) {
-        found = intersect_triangle(ray, triangle, culls, hit) || found;
+        found = intersect_triangle(walk.ray, triangle, walk.instance, SINGLE_SIDED && !any, hit) || found;
         triangle++;
     }
-    cut = cut || triangle < end;
+    walk.cut = walk.cut || triangle < end;
     return found;
 }
 
@@ -80,84 +122,108 @@ void check_complete(int node, bool cut) {
         atomicAdd(counters[COUNTER_LOST], 1u);
 }
 
-/// The walk with an array for a stack, as deep as any tree.
-void traverse_deep(GridRay grid, ShearedRay ray, bool any, inout Hit hit) {
-    bool cut = false;
-    int stack[MAX_TREE_DEPTH];
+/// The walk with an array for a stack, as deep as any two trees.
+void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
+    int stack[2u * MAX_TREE_DEPTH + 1u];
     int height = 0;
+    Walk walk = begin_walk(world_ray);
     int node = 0;
     while (node != NOTHING && node != IMPOSSIBLE) {
         bool found = false;
         if (node >= 0) {
-            Visit next = visit(grid, node, hit.t, any);
+            Visit next = visit(walk.grid, node, hit.t, any);
             if (next.both)
                 stack[height++] = next.farther;
             node = next.nearer;
             if (!next.none)
                 continue;
+        } else if (INSTANCES && node == LEAVE) {
+            leave_instance(walk, world_ray);
+        } else if (is_instance(node)) {
+            stack[height++] = LEAVE;
+            node = enter_instance(walk, world_ray, node);
+            continue;
         } else {
-            found = visit_leaf(ray, node, SINGLE_SIDED && !any, cut, hit);
+            found = visit_leaf(walk, node, any, hit);
         }
         node = height > 0 && !(any && found) ? stack[--height] : NOTHING;
     }
-    check_complete(node, cut);
+    check_complete(node, walk.cut);
+}
+
+/// A stack in registers: the top is entry 0.
+struct Stack {
+    int entries[REGISTERS];
+    /// Not 0 when an entry was lost.
+    int overflow;
+};
+
+void push(inout Stack stack, int node) {
+    if (DEEP_TREE)
+        stack.overflow |= stack.entries[REGISTERS - 1] ^ NOTHING;
+    [[unroll]] for (int i = REGISTERS - 1; i > 0; i--)
+        stack.entries[i] = stack.entries[i - 1];
+    stack.entries[0] = node;
+}
+
+void pop(inout Stack stack) {
+    [[unroll]] for (int i = 0; i < REGISTERS - 1; i++)
+        stack.entries[i] = stack.entries[i + 1];
+    stack.entries[REGISTERS - 1] = NOTHING;
 }
 
 /// The walk with registers for a stack; false if it overflowed and is worth nothing.
-bool traverse_shallow(GridRay grid, ShearedRay ray, bool any, inout Hit hit) {
-    bool cut = false;
-    int stack[REGISTERS];
+bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
+    Walk walk = begin_walk(world_ray);
+    Stack stack;
+    stack.overflow = 0;
     [[unroll]] for (int i = 0; i < REGISTERS; i++)
-        stack[i] = NOTHING;
-    int overflow = 0;
+        stack.entries[i] = NOTHING;
     int node = 0;
     while (node != NOTHING) {
         // An inner node, and not IMPOSSIBLE.
         while (uint(node) < uint(IMPOSSIBLE)) {
-            Visit next = visit(grid, node, hit.t, any);
-            node = next.none ? stack[0] : next.nearer;
-            if (DEEP_TREE)
-                overflow |= next.both ? stack[REGISTERS - 1] ^ NOTHING : 0;
-            if (next.both) {
-                [[unroll]] for (int i = REGISTERS - 1; i > 0; i--)
-                    stack[i] = stack[i - 1];
-                stack[0] = next.farther;
-            }
-            if (next.none) {
-                [[unroll]] for (int i = 0; i < REGISTERS - 1; i++)
-                    stack[i] = stack[i + 1];
-                stack[REGISTERS - 1] = NOTHING;
-            }
+            Visit next = visit(walk.grid, node, hit.t, any);
+            node = next.none ? stack.entries[0] : next.nearer;
+            if (next.both)
+                push(stack, next.farther);
+            if (next.none)
+                pop(stack);
         }
         if (node >= 0 || node == NOTHING)
             break;
-        bool found = visit_leaf(ray, node, SINGLE_SIDED && !any, cut, hit);
-        node = stack[0];
-        [[unroll]] for (int i = 0; i < REGISTERS - 1; i++)
-            stack[i] = stack[i + 1];
-        stack[REGISTERS - 1] = NOTHING;
+        if (is_instance(node)) {
+            push(stack, LEAVE);
+            node = enter_instance(walk, world_ray, node);
+            continue;
+        }
+        bool found = false;
+        if (INSTANCES && node == LEAVE)
+            leave_instance(walk, world_ray);
+        else
+            found = visit_leaf(walk, node, any, hit);
+        node = stack.entries[0];
+        pop(stack);
         if (any && found) {
             node = NOTHING;
-            overflow = 0;
+            stack.overflow = 0;
         }
     }
-    check_complete(node, cut);
-    return overflow == 0;
+    check_complete(node, walk.cut);
+    return stack.overflow == 0;
 }
 
 /// Finds the nearest hit, or with `any` some hit, closer than hit.t; a miss leaves hit as it was. False: the ray must be traced
 /// again by a kernel with RETRACE, its answer is worth nothing.
 bool traverse(Ray world_ray, bool any, inout Hit hit) {
-    GridRay grid = grid_ray(world_ray);
-    ShearedRay ray = shear_ray(world_ray);
     if (RETRACE) {
-        traverse_deep(grid, ray, any, hit);
+        traverse_deep(world_ray, any, hit);
         return true;
     }
-    return traverse_shallow(grid, ray, any, hit);
+    return traverse_shallow(world_ray, any, hit);
 }
 
 /// No hit yet, and none wanted beyond `distance`.
 Hit no_hit(float distance) {
-    return Hit(distance, NO_TRIANGLE, NO_TRIANGLE, vec2(0.0));
+    return Hit(distance, NO_TRIANGLE, NO_TRIANGLE, vec2(0.0), 0u);
 }

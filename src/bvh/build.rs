@@ -4,7 +4,7 @@
 //! fill, and is handed down in proportion, so that every subtree knows its budget and the tree is the same on any number of
 //! threads.
 
-use super::reference::{bounds_of, Box4, Reference};
+use super::references::{bounds_of, Box4, Reference};
 use super::{object_split, spatial_split, Bvh, Child, Node};
 use crate::layout::MAX_TREE_DEPTH;
 use glam::Vec3;

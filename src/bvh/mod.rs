@@ -7,19 +7,19 @@ mod aabb;
 mod build;
 mod object_split;
 mod quantise;
-mod reference;
+mod references;
 mod spatial_split;
 mod stats;
 
 pub use aabb::Aabb;
-pub use quantise::{quantise, Grid, Quantised};
+pub use quantise::{quantise, reference, Grid, Quantised};
 pub use stats::Stats;
 
 use crate::layout::{MAX_LEAF_TRIANGLES, MAX_TREE_DEPTH};
 use build::Recipe;
 use glam::Vec3;
 use rayon::prelude::*;
-use reference::Reference;
+use references::Reference;
 
 /// Larger leaves appear only where nothing separates their triangles; smaller ones wherever that is cheaper.
 const LEAF: usize = 6;
@@ -96,6 +96,13 @@ impl Bvh {
             (0..).zip(boxes).map(|(primitive, bounds)| Reference::new(bounds.lo, bounds.hi, primitive)).collect();
         let recipe = Recipe { leaf: LEAF, spatial: None };
         build::build(&mut references, boxes.len(), recipe)
+    }
+
+    /// Builds a tree over boxes, each in a leaf of its own.
+    pub fn over_instances(boxes: &[Aabb]) -> Self {
+        let mut references: Vec<Reference> =
+            (0..).zip(boxes).map(|(primitive, bounds)| Reference::new(bounds.lo, bounds.hi, primitive)).collect();
+        build::build(&mut references, boxes.len(), Recipe { leaf: 1, spatial: None })
     }
 
     /// Builds a tree over triangles, as [`Bvh::build`]; one that is long may lie in several leaves.

@@ -1,7 +1,7 @@
 //! Splits that give each reference to one side, by the surface area heuristic: over bins along each axis (Wald, On fast
 //! construction of SAH-based bounding volume hierarchies, RT 2007), or over every place between few sorted references.
 
-use super::reference::{Box4, Reference};
+use super::references::{Box4, Reference};
 use glam::Vec4;
 
 /// Most bins along an axis; fewer where there are few references.

@@ -51,8 +51,17 @@ impl Grid {
     }
 }
 
-/// Quantises a tree for rays that start at most `reach` away from its centre (world units, per axis).
-pub fn quantise(bvh: &Bvh, reach: Vec3) -> Quantised {
+/// A child's reference in a tree whose nodes and primitives begin at these places of the device's arrays.
+pub fn reference(child: Child, first_node: u32, first_primitive: u32) -> u32 {
+    match child {
+        Child::Node(index) => first_node + index,
+        Child::Leaf { first, count } => !((first_primitive + first) << 4 | count),
+    }
+}
+
+/// Quantises a tree for rays that start at most `reach` away from the origin (units of its boxes, per axis). `refer` makes the
+/// children's references, see [`reference`].
+pub fn quantise(bvh: &Bvh, reach: Vec3, refer: impl Fn(Child) -> u32 + Sync) -> Quantised {
     let empty = bvh.order.is_empty();
     let bounds = if empty { Aabb { lo: Vec3::ZERO, hi: Vec3::ZERO } } else { bvh.bounds };
     let half = ((bounds.hi - bounds.lo) / 2.0).as_dvec3();
@@ -64,11 +73,7 @@ pub fn quantise(bvh: &Bvh, reach: Vec3) -> Quantised {
     let record = |bounds: &Aabb, child: &Child| {
         let lo = (grid.coordinate(bounds.lo) - margin).floor().clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
         let hi = (grid.coordinate(bounds.hi) + margin).ceil().clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
-        let reference = match *child {
-            Child::Node(index) => index,
-            Child::Leaf { first, count } => !(first << 4 | count),
-        };
-        [lo.x | lo.y << 16, lo.z | hi.x << 16, hi.y | hi.z << 16, reference]
+        [lo.x | lo.y << 16, lo.z | hi.x << 16, hi.y | hi.z << 16, refer(*child)]
     };
     let records = bvh
         .nodes
@@ -92,7 +97,7 @@ mod tests {
             order: vec![0],
             bounds,
         };
-        let quantised = quantise(&bvh, Vec3::ZERO);
+        let quantised = quantise(&bvh, Vec3::ZERO, |child| reference(child, 0, 0));
         assert_eq!(quantised.records[0][3], 0xffff_ff5c);
         assert_eq!(quantised.records[1][3], 7);
     }
@@ -107,7 +112,7 @@ mod tests {
             .collect();
         let bvh = Bvh::build(&boxes);
         for reach in [0.0, 1e3, 1e6, 1e9] {
-            let quantised = quantise(&bvh, Vec3::splat(reach));
+            let quantised = quantise(&bvh, Vec3::splat(reach), |child| reference(child, 0, 0));
             let world = |coordinates: [u32; 3]| {
                 DVec3::from_array(coordinates.map(f64::from)) / quantised.grid.scale.as_dvec3()
                     + quantised.grid.origin.as_dvec3()

@@ -1,7 +1,7 @@
 //! Splits of space, which cut triangles in two: Stich, Friedrich and Dietrich, Spatial splits in bounding volume
 //! hierarchies, HPG 2009. Worth their build time where long triangles overlap each other's boxes.
 
-use super::reference::{Box4, Reference};
+use super::references::{Box4, Reference};
 use glam::{Vec3, Vec4};
 
 /// Most slices of a node's box along each axis, between which planes are tried; fewer where there are few references.

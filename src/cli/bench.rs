@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use glimt::render::ray_sets::{BenchRay, BenchView, PrimaryHit, SetKind};
 use glimt::render::{describe_device, Met, Prepared, Renderer, Trace, Tracer, Tree};
 use glimt::report::{Bench, BenchTree, Mismatches, Set, Spread};
-use glimt::scene::{Camera, LightKind, Projection};
+use glimt::scene::{Camera, Instancing, LightKind, Projection};
 use glimt::vulkan::DeviceChoice;
 use glimt::{reference, Error, Options, Result, Scene};
 use std::path::{Path, PathBuf};
@@ -82,7 +82,9 @@ impl BenchArgs {
     /// Traces, times, compares.
     pub fn run(self, context: &Context) -> Result<Outcome> {
         set_threads(self.threads)?;
-        let mut options = Options { interrupted: context.interrupted.clone(), ..Options::default() };
+        // Rays are compared with programs that know triangles alone.
+        let instancing = Instancing::Flat;
+        let mut options = Options { interrupted: context.interrupted.clone(), instancing, ..Options::default() };
         options.device = self.device.clone().map_or(DeviceChoice::Best, DeviceChoice::Named);
         let scene = load_scene(&self.scene, None)?;
         let (prepared, view) = self.prepare(&scene, &options)?;
@@ -102,19 +104,19 @@ impl BenchArgs {
             return Err(Error::Validation(renderer.device().instance.messages()));
         }
         files.write(&prepared, &view)?;
-        let stats = tree.bvh.stats();
+        let (size, report) = (tree.size(), tree.report());
         let bench = Bench {
             scene: scene.name.clone(),
-            triangles: prepared.soup.len(),
+            triangles: prepared.soup.placed,
             sets,
             bvh: BenchTree {
                 builder: tree.quality.name(),
                 build_ms: Spread::of(build_ms).median,
-                nodes: stats.nodes,
-                bytes: 32 * stats.nodes as u64,
-                triangle_bytes: 48 * tree.bvh.order.len() as u64,
-                sah_cost: stats.sah_cost,
-                depth: stats.depth,
+                nodes: report.nodes,
+                bytes: report.bytes,
+                triangle_bytes: 48 * size.triangles as u64,
+                sah_cost: report.sah_cost,
+                depth: report.depth,
             },
             device: describe_device(renderer.device()),
         };

@@ -41,8 +41,8 @@ impl ExplainArgs {
         let options = self.view.options()?;
         let Prepared { soup, view, features } = Prepared::new(&scene, &options)?;
         let tree = Tree::build(&soup, options.quality(soup.len()));
-        let (features, nodes) = (tree.features(features), tree.bvh.nodes.len());
-        let plan = Plan::new(&scene, &soup, &view, features, nodes, options.samples_in_flight);
+        let (features, size) = (tree.features(features), tree.size());
+        let plan = Plan::new(&scene, &soup, &view, features, size, options.samples_in_flight);
         match if self.json { Form::Json } else { self.format } {
             Form::Text => Ok(Outcome::text(text(&plan, &scene.name, view.samples))),
             Form::Mermaid => Ok(Outcome::text(mermaid(&plan))),

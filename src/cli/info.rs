@@ -2,7 +2,7 @@
 
 use super::{load_scene, Outcome};
 use clap::{Args, ValueHint};
-use glimt::scene::{LightKind, Projection, Soup};
+use glimt::scene::{Instancing, LightKind, Projection, Soup};
 use glimt::{Result, Scene};
 use serde::Serialize;
 use std::fmt::Write;
@@ -41,7 +41,7 @@ struct Info {
 
 impl Info {
     fn of(scene: &Scene) -> Result<Self> {
-        let soup = Soup::of(scene)?;
+        let soup = Soup::with(scene, Instancing::Auto)?;
         let rgb = |v: glam::DVec3| format!("{:.3} {:.3} {:.3}", v.x, v.y, v.z);
         let material = |material: &glimt::scene::Material| {
             let sides = if material.double_sided { "both sides" } else { "front only" };
@@ -84,7 +84,7 @@ impl Info {
             name: scene.name.clone(),
             meshes: scene.meshes.len(),
             instances: scene.instances.len(),
-            triangles: soup.len(),
+            triangles: soup.placed,
             unique_triangles: scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum(),
             vertices: scene.meshes.iter().map(|mesh| mesh.positions.len()).sum(),
             bounds: soup.bounds().map(|(lo, hi)| [lo.to_array(), hi.to_array()]),

@@ -5,7 +5,7 @@ use super::{load_scene, milliseconds, progress, set_threads, stop_if_interrupted
 use clap::{Args, ValueHint};
 use glimt::film::{Film, Format, Saved};
 use glimt::render::{describe, Prepared, Renderer, Tree};
-use glimt::scene::Background;
+use glimt::scene::{Background, Instancing};
 use glimt::vulkan::DeviceChoice;
 use glimt::{reference, report, Error, Options, Report, Result, Scene};
 use std::path::{Path, PathBuf};
@@ -108,6 +108,7 @@ impl RenderArgs {
 
     fn on_reference(&self, options: &Options) -> Result<(Film, Report)> {
         let start = Instant::now();
+        let options = &Options { instancing: Instancing::Flat, ..options.clone() };
         let (scene, Prepared { soup, view, .. }) = self.load(options)?;
         let load = milliseconds(start);
         let start = Instant::now();

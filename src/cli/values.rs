@@ -3,6 +3,7 @@
 use clap::ValueEnum;
 use glam::DVec3;
 use glimt::bvh::Quality;
+use glimt::scene::Instancing;
 
 /// How much work goes into the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -21,6 +22,27 @@ impl From<BvhChoice> for Quality {
             BvhChoice::Fast => Self::Fast,
             BvhChoice::Balanced => Self::Balanced,
             BvhChoice::Best => Self::Best,
+        }
+    }
+}
+
+/// Whether instances share the triangles of their mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum InstancingChoice {
+    /// Where that saves much memory
+    Auto,
+    /// Wherever that saves any memory: rays take longer
+    Shared,
+    /// Never: every instance has its own triangles
+    Flat,
+}
+
+impl From<InstancingChoice> for Instancing {
+    fn from(choice: InstancingChoice) -> Self {
+        match choice {
+            InstancingChoice::Auto => Self::Auto,
+            InstancingChoice::Shared => Self::Shared,
+            InstancingChoice::Flat => Self::Flat,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Flags that choose the picture, the same for every command that renders.
 
-use super::values::{size, vector, BvhChoice};
+use super::values::{size, vector, BvhChoice, InstancingChoice};
 use clap::Args;
 use glam::DVec3;
 use glimt::scene::{Background, CameraChoice};
@@ -51,6 +51,9 @@ pub struct ViewArgs {
     /// How much work goes into the tree; changes no pixel [default: by the numbers of triangles and rays]
     #[arg(long, value_enum)]
     bvh: Option<BvhChoice>,
+    /// Whether instances share the triangles of their mesh in memory
+    #[arg(long, value_enum, default_value_t = InstancingChoice::Auto)]
+    instances: InstancingChoice,
     /// Compile and run everything, needed or not
     #[arg(long, hide = true)]
     all_features: bool,
@@ -88,6 +91,7 @@ impl ViewArgs {
             default_light: !self.no_default_light,
             samples_in_flight: self.samples_in_flight,
             bvh: self.bvh.map(Into::into),
+            instancing: self.instances.into(),
             all_features: self.all_features,
             ..Options::default()
         })

@@ -11,9 +11,8 @@ mod upload;
 pub use options::{Options, Progress};
 pub use plan::{LeftOut, Plan, PlannedBuffer, PlannedPass};
 pub use trace::{Met, Trace, Tracer};
-pub use tree::Tree;
+pub use tree::{Tree, TreeSize};
 
-use crate::bvh::quantise;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{binding, BindingKind, Features, KernelCode, RayItem, Step};
@@ -63,7 +62,7 @@ impl Prepared {
     /// # Errors
     /// As [`Options::view`] and [`Soup::of`].
     pub fn new(scene: &Scene, options: &Options) -> Result<Self> {
-        let soup = Soup::of(scene)?;
+        let soup = Soup::with(scene, options.instancing)?;
         let view = options.view(scene, &soup)?;
         let features =
             if options.all_features { Features::ALL } else { crate::scene::features::of(scene, &soup, &view) };
@@ -178,11 +177,11 @@ impl Renderer {
         // No queue may be larger than what the device binds at once.
         let most = self.device.info.max_storage_bytes / size_of::<RayItem>() as u64;
         let in_flight = options.samples_in_flight.min(u32::try_from(most).unwrap_or(u32::MAX));
-        let plan = Plan::new(scene, soup, view, features, tree.bvh.nodes.len(), in_flight);
+        let plan = Plan::new(scene, soup, view, features, tree.size(), in_flight);
         let start = Instant::now();
-        let quantised = quantise(&tree.bvh, (view.camera.eye - tree.center).abs().as_vec3());
-        let frame =
-            frame::Frame::new(self, view, upload::Scene { scene, soup, view, tree, quantised: &quantised }, plan)?;
+        let device_tree = tree.for_device(soup, view.camera.eye);
+        let on_device = upload::Scene { scene, soup, view, tree: &device_tree, center: tree.center };
+        let frame = frame::Frame::new(self, view, on_device, plan)?;
         let upload = milliseconds(start);
         let start = Instant::now();
         let (film, outcome) = frame.run(options)?;
@@ -191,7 +190,6 @@ impl Renderer {
         if !messages.is_empty() {
             return Err(Error::Validation(messages));
         }
-        let stats = tree.bvh.stats();
         let report = Report {
             image: report::Image { width: view.width, height: view.height, ..Default::default() },
             device: describe_device(&self.device),
@@ -199,12 +197,7 @@ impl Renderer {
             features: features.needs().collect(),
             passes: outcome.passes,
             rays: outcome.rays,
-            bvh: report::Tree {
-                nodes: stats.nodes,
-                depth: stats.depth,
-                sah_cost: stats.sah_cost,
-                bytes: size_of_val(quantised.records.as_slice()) as u64,
-            },
+            bvh: tree.report(),
             times_ms: report::Times { device: self.opened_in_ms, upload, render, ..Default::default() },
             memory_bytes: report::Memory { device_peak: self.device.peak_memory(), queues: outcome.queue_bytes },
         };
@@ -215,7 +208,7 @@ impl Renderer {
 /// The scene's part of a report.
 pub fn describe(scene: &Scene, soup: &Soup, view: &View) -> report::Scene {
     report::Scene {
-        triangles: soup.len(),
+        triangles: soup.placed,
         instances: scene.instances.len(),
         lights: view.lights.len(),
         materials: scene.materials.len(),

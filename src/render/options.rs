@@ -2,7 +2,7 @@
 
 use crate::bvh::Quality;
 use crate::error::Result;
-use crate::scene::{Background, CameraChoice, Scene, Soup, View};
+use crate::scene::{Background, CameraChoice, Instancing, Scene, Soup, View};
 use crate::vulkan::DeviceChoice;
 use glam::DVec3;
 use std::sync::atomic::AtomicBool;
@@ -38,6 +38,8 @@ pub struct Options {
     pub samples_in_flight: u32,
     /// How much work goes into the tree; `None`: as much as the rays will save. Changes no pixel.
     pub bvh: Option<Quality>,
+    /// Whether instances share the triangles of their mesh.
+    pub instancing: Instancing,
     /// Every feature on, needed or not: slower, the same picture. For tests.
     pub all_features: bool,
     /// Progress.
@@ -61,6 +63,7 @@ impl Default for Options {
             validate: false,
             samples_in_flight: 1 << 18,
             bvh: None,
+            instancing: Instancing::Auto,
             all_features: false,
             progress: None,
             interrupted: Arc::default(),

@@ -1,7 +1,10 @@
 //! What a scene gets: features, passes, buffers; and what was left out and why. Computed without any device, and the only
 //! source from which the frame is recorded and buffers are allocated.
 
-use crate::layout::{Features, HitItem, Light, Material, RayItem, NODE_TEXELS, TILE, TRIANGLE_TEXELS, WORKGROUP};
+use super::TreeSize;
+use crate::layout::{
+    Features, HitItem, Light, Material, RayItem, INSTANCE_TEXELS, NODE_TEXELS, TILE, TRIANGLE_TEXELS, WORKGROUP,
+};
 use crate::scene::{Scene, Soup, View};
 
 /// Bytes of a texel.
@@ -66,8 +69,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan for a view whose tree has `nodes` inner nodes.
-    pub fn new(scene: &Scene, soup: &Soup, view: &View, features: Features, nodes: usize, in_flight: u32) -> Self {
+    /// The plan for a view of a scene with a tree of this size.
+    pub fn new(scene: &Scene, soup: &Soup, view: &View, features: Features, tree: TreeSize, in_flight: u32) -> Self {
         let tiles = u64::from(view.width.div_ceil(TILE)) * u64::from(view.height.div_ceil(TILE));
         let padded_pixels = tiles * u64::from(TILE * TILE);
         let in_flight = in_flight.clamp(WORKGROUP, MOST_IN_FLIGHT) / WORKGROUP * WORKGROUP;
@@ -87,7 +90,7 @@ impl Plan {
             left_out: Vec::new(),
         };
         plan.plan_passes(view);
-        plan.plan_buffers(scene, soup, view, nodes);
+        plan.plan_buffers(scene, soup, view, tree);
         plan.explain_left_out(view);
         plan
     }
@@ -140,20 +143,21 @@ impl Plan {
         pass("resolve", 1, "samples → pixels");
     }
 
-    fn plan_buffers(&mut self, scene: &Scene, soup: &Soup, view: &View, nodes: usize) {
+    fn plan_buffers(&mut self, scene: &Scene, soup: &Soup, view: &View, tree: TreeSize) {
         let features = self.features;
         let triangles = soup.len() as u64;
         let in_flight = self.in_flight();
         let per_triangle = |needed: bool| if needed { triangles * u64::from(TRIANGLE_TEXELS) * TEXEL } else { 0 };
         let queue = |needed: bool, item: usize| if needed { in_flight * item as u64 } else { 0 };
         let mut buffer = |name, bytes, is_queue| self.buffers.push(PlannedBuffer { name, bytes, is_queue });
-        buffer("nodes", nodes as u64 * u64::from(NODE_TEXELS) * TEXEL, false);
-        buffer("triangles", per_triangle(true), false);
+        buffer("nodes", tree.nodes as u64 * u64::from(NODE_TEXELS) * TEXEL, false);
+        buffer("triangles", tree.triangles as u64 * u64::from(TRIANGLE_TEXELS) * TEXEL, false);
         buffer("normals", per_triangle(features.smooth_normals), false);
         buffer("colors", per_triangle(features.vertex_colors), false);
         buffer("materials", (scene.materials.len() * size_of::<Material>()) as u64, false);
         let lights = if features.shadows { view.lights.len().max(1) * size_of::<Light>() } else { 0 };
         buffer("lights", lights as u64, false);
+        buffer("instances", tree.instances as u64 * u64::from(INSTANCE_TEXELS) * TEXEL, false);
         buffer("frame", size_of::<crate::layout::Frame>() as u64, false);
         buffer("hit_queue", queue(true, size_of::<HitItem>()), true);
         buffer("shadow_queue", queue(features.shadows, size_of::<RayItem>()), true);
@@ -182,6 +186,7 @@ impl Plan {
         leave(features.smooth_normals, &["normals"], "all triangles are flat");
         leave(features.vertex_colors, &["colors"], "no mesh has vertex colours");
         leave(features.single_sided, &["back-face culling"], "all materials are double-sided");
+        leave(features.instances, &["instances"], "no mesh is shared, or that would save little");
         leave(features.deep_tree, &["retrace_queue"], "the tree is no deeper than the stack");
         leave(features.multisampling, &["sample positions"], "one sample a pixel goes through its centre");
     }

@@ -4,7 +4,6 @@
 use super::frame::{all_complete, Frame};
 use super::ray_sets::{BenchRay, SetKind};
 use super::{upload, Options, Plan, Renderer};
-use crate::bvh::quantise;
 use crate::error::{Error, Result};
 use crate::layout::{
     binding, Features, HitItem, RayItem, Step, COUNTERS, COUNTER_FILLING, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW,
@@ -20,7 +19,9 @@ use std::time::Instant;
 pub struct Tracer<'a> {
     frame: Frame<'a>,
     prepared: &'a super::Prepared,
-    tree: &'a super::Tree,
+    center: DVec3,
+    /// Primitives in leaf order.
+    order: Vec<u32>,
 }
 
 /// What a ray met.
@@ -59,18 +60,19 @@ impl Renderer {
         &'a self,
         scene: &'a Scene,
         prepared: &'a super::Prepared,
-        tree: &'a super::Tree,
+        tree: &super::Tree,
     ) -> Result<Tracer<'a>> {
         let View { width, height, .. } = prepared.view;
         let features = tree.features(Features { shadows: true, reflections: true, ..Features::default() });
-        let plan = Plan::new(scene, &prepared.soup, &prepared.view, features, tree.bvh.nodes.len(), width * height);
+        let plan = Plan::new(scene, &prepared.soup, &prepared.view, features, tree.size(), width * height);
         if plan.waves(1) != 1 {
             return Err(Error::Usage(format!("{width}x{height} rays do not fit into one wave")));
         }
         let (soup, view) = (&prepared.soup, &prepared.view);
-        let quantised = quantise(&tree.bvh, (view.camera.eye - tree.center).abs().as_vec3());
-        let frame = Frame::new(self, view, upload::Scene { scene, soup, view, tree, quantised: &quantised }, plan)?;
-        Ok(Tracer { frame, prepared, tree })
+        let device_tree = tree.for_device(soup, view.camera.eye);
+        let on_device = upload::Scene { scene, soup, view, tree: &device_tree, center: tree.center };
+        let frame = Frame::new(self, view, on_device, plan)?;
+        Ok(Tracer { frame, prepared, center: tree.center, order: device_tree.order })
     }
 }
 
@@ -80,7 +82,7 @@ impl Tracer<'_> {
     /// # Errors
     /// `Device` when the rays do not fit or one is lost; `Vulkan` when the device fails.
     pub fn trace(&mut self, kind: SetKind, rays: &[BenchRay], runs: usize, options: &Options) -> Result<Trace> {
-        let input = Input::new(self.frame.renderer, kind, rays, self.tree.center)?;
+        let input = Input::new(self.frame.renderer, kind, rays, self.center)?;
         if rays.len() > (self.prepared.view.width * self.prepared.view.height) as usize {
             return Err(Error::Device(format!("{} rays do not fit into the queue", rays.len())));
         }
@@ -178,7 +180,7 @@ impl Tracer<'_> {
         let queue = read_back(binding::HIT_QUEUE)?;
         let items: &[HitItem] = bytemuck::cast_slice(&queue.read()?[..hits * size_of::<HitItem>()]);
         for item in items {
-            let primitive = self.tree.bvh.order[item.triangle as usize];
+            let primitive = self.order[item.triangle as usize];
             let ray = &rays[item.sample_index as usize];
             let corners = self.prepared.soup.positions[primitive as usize];
             let [l2, l3] = item.barycentrics.map(f64::from);

@@ -1,33 +1,245 @@
-//! A soup's tree in the device's world.
+//! The trees over a soup, and what the device gets of them.
+//!
+//! A flat soup has one tree over its triangles in the device's world. Where instances share parts, each part has a tree in its
+//! own space, about its own centre, and an upper tree over the instances' boxes has one instance in each leaf.
 
-use crate::bvh::{Bvh, Quality};
-use crate::layout::{Features, STACK_REGISTERS};
-use crate::scene::Soup;
-use glam::{DVec3, Vec3};
+use crate::bvh::{quantise, reference, Aabb, Bvh, Child, Grid, Quality};
+use crate::layout::{Features, Instance, LEAF_IS_INSTANCE, STACK_REGISTERS};
+use crate::report;
+use crate::scene::{Placement, Soup};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use rayon::prelude::*;
 
-/// A tree over a soup.
+/// The trees over a soup.
 pub struct Tree {
-    /// The tree.
-    pub bvh: Bvh,
+    parts: Vec<Part>,
+    /// Over the placements; `None` for a flat soup.
+    upper: Option<Bvh>,
     /// Origin of the device's world, in world space: the soup's centre.
     pub center: DVec3,
     /// How it was built.
     pub quality: Quality,
 }
 
+/// The tree over a part of the soup.
+struct Part {
+    bvh: Bvh,
+    /// Origin of its boxes, in the part's space.
+    center: DVec3,
+}
+
+/// Sizes on the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TreeSize {
+    /// Inner nodes of all trees.
+    pub nodes: usize,
+    /// Triangles in leaves; one that was cut counts for each of its parts.
+    pub triangles: usize,
+    /// Instances; 0 in a flat scene.
+    pub instances: usize,
+}
+
+/// What the device gets.
+pub(super) struct DeviceTree {
+    /// Two records a node; the root is node 0.
+    pub records: Vec<[u32; 4]>,
+    /// Grid of the root's tree.
+    pub grid: Grid,
+    /// Primitives in leaf order.
+    pub order: Vec<u32>,
+    /// In the order of the upper tree's leaves.
+    pub instances: Vec<Instance>,
+    /// Origin of each primitive's positions, by part: its first primitive and the origin.
+    centers: Vec<(usize, DVec3)>,
+}
+
+impl DeviceTree {
+    /// Origin of a primitive's positions on the device, in the space of its part.
+    pub fn center_of(&self, primitive: usize) -> DVec3 {
+        let part = self.centers.partition_point(|(first, _)| *first <= primitive);
+        self.centers[part - 1].1
+    }
+}
+
 impl Tree {
-    /// Builds the tree over a soup.
+    /// Builds the trees over a soup.
     pub fn build(soup: &Soup, quality: Quality) -> Self {
         let center = soup.center();
-        let local = |corners: &[DVec3; 3]| corners.map(|corner| (corner - center).as_vec3());
-        let triangles: Vec<[Vec3; 3]> = soup.positions.par_iter().map(local).collect();
-        Self { bvh: Bvh::over_triangles(&triangles, quality), center, quality }
+        let part = |range: &std::ops::Range<usize>| {
+            let positions = &soup.positions[range.clone()];
+            let center = if soup.is_flat() { center } else { center_of(positions) };
+            let local = |corners: &[DVec3; 3]| corners.map(|corner| (corner - center).as_vec3());
+            let triangles: Vec<[Vec3; 3]> = positions.par_iter().map(local).collect();
+            Part { bvh: Bvh::over_triangles(&triangles, quality), center }
+        };
+        let parts: Vec<Part> = soup.parts.par_iter().map(part).collect();
+        let upper = (!soup.is_flat()).then(|| {
+            let boxes: Vec<Aabb> = soup
+                .placements
+                .par_iter()
+                .map(|placement| {
+                    let part = &parts[placement.part];
+                    world_box(&part.bvh.bounds, &Transforms::new(placement, part.center, center))
+                })
+                .collect();
+            Bvh::over_instances(&boxes)
+        });
+        Self { parts, upper, center, quality }
     }
 
-    /// The features with what the tree itself needs.
+    /// The features with what the trees themselves need.
     pub fn features(&self, features: Features) -> Features {
-        let deep_tree = features.deep_tree || self.bvh.stats().depth > STACK_REGISTERS;
-        Features { deep_tree, ..features }
+        let instances = features.instances || self.upper.is_some();
+        // Besides the nodes there is a mark on the stack where an instance was entered.
+        let depth = self.report().depth + u32::from(instances);
+        Features { deep_tree: features.deep_tree || depth > STACK_REGISTERS, instances, ..features }
+    }
+
+    /// Sizes on the device.
+    pub fn size(&self) -> TreeSize {
+        let parts = self.parts.iter().map(|part| &part.bvh);
+        TreeSize {
+            nodes: parts.clone().chain(&self.upper).map(|bvh| bvh.nodes.len()).sum(),
+            triangles: parts.map(|bvh| bvh.order.len()).sum(),
+            instances: self.upper.as_ref().map_or(0, |upper| upper.order.len()),
+        }
+    }
+
+    /// Counts for a report: the deepest path through both levels; the cost of the tree that rays enter first, with an instance
+    /// counted as one triangle.
+    pub fn report(&self) -> report::Tree {
+        let lower = self.parts.iter().map(|part| part.bvh.stats());
+        let root = self.upper.as_ref().or(self.parts.first().map(|part| &part.bvh)).map(Bvh::stats);
+        let upper_depth = self.upper.as_ref().map_or(0, |upper| upper.stats().depth);
+        let nodes = self.size().nodes;
+        report::Tree {
+            nodes,
+            depth: upper_depth + lower.map(|stats| stats.depth).max().unwrap_or(0),
+            sah_cost: root.map_or(0.0, |stats| stats.sah_cost),
+            bytes: 32 * nodes as u64,
+        }
+    }
+
+    /// The trees for rays that start in the scene or at `eye`.
+    pub(super) fn for_device(&self, soup: &Soup, eye: DVec3) -> DeviceTree {
+        let eye = eye - self.center;
+        let mut device = DeviceTree {
+            records: Vec::new(),
+            grid: Grid { origin: Vec3::ZERO, scale: Vec3::ONE },
+            order: Vec::with_capacity(self.size().triangles),
+            instances: Vec::new(),
+            centers: soup.parts.iter().zip(&self.parts).map(|(range, part)| (range.start, part.center)).collect(),
+        };
+        let Some(upper) = &self.upper else {
+            for part in &self.parts {
+                let quantised = quantise(&part.bvh, eye.abs().as_vec3(), |child| reference(child, 0, 0));
+                (device.records, device.grid) = (quantised.records, quantised.grid);
+                device.order.clone_from(&part.bvh.order);
+            }
+            // Only kernels that were told to expect instances look at it: the scene as it is.
+            let whole = Transforms { world_from_part: DMat4::IDENTITY, part_from_world: DMat4::IDENTITY };
+            device.instances.push(Instance { condition: 0.0, ..whole.instance(&device.grid, 0) });
+            return device;
+        };
+        // A leaf of the upper tree names its instance by its place.
+        let refer = |child: Child| match child {
+            Child::Node(index) => index,
+            Child::Leaf { first, .. } => !(first << 4 | LEAF_IS_INSTANCE),
+        };
+        let quantised = quantise(upper, eye.abs().as_vec3(), refer);
+        (device.records, device.grid) = (quantised.records, quantised.grid);
+        let transforms: Vec<Transforms> = soup
+            .placements
+            .par_iter()
+            .map(|placement| Transforms::new(placement, self.parts[placement.part].center, self.center))
+            .collect();
+        let starts = [upper.bounds.lo.as_dvec3(), upper.bounds.hi.as_dvec3(), eye];
+        let mut reach = vec![DVec3::ZERO; self.parts.len()];
+        for (placement, transforms) in soup.placements.iter().zip(&transforms) {
+            let reach = &mut reach[placement.part];
+            for point in box_corners(starts[0], starts[1]).into_iter().chain([starts[2]]) {
+                *reach = reach.max(transforms.part_from_world.transform_point3(point).abs());
+            }
+        }
+        let mut lower = Vec::new();
+        for ((part, range), reach) in self.parts.iter().zip(&soup.parts).zip(reach) {
+            let first_node = (device.records.len() / 2) as u32;
+            let first_primitive = device.order.len() as u32;
+            let refer = |child| reference(child, first_node, first_primitive);
+            let quantised = quantise(&part.bvh, reach.as_vec3(), refer);
+            // A tree of one leaf has a node only so that a flat scene has a root.
+            let root = match part.bvh.nodes[0].children {
+                [leaf @ Child::Leaf { .. }, Child::Leaf { count: 0, .. }] => refer(leaf),
+                _ => first_node,
+            };
+            device.records.extend(quantised.records);
+            device.order.extend(part.bvh.order.iter().map(|primitive| primitive + range.start as u32));
+            lower.push((quantised.grid, root));
+        }
+        let instance = |index: &u32| {
+            let (grid, root) = lower[soup.placements[*index as usize].part];
+            transforms[*index as usize].instance(&grid, root)
+        };
+        device.instances = upper.order.par_iter().map(instance).collect();
+        device
+    }
+}
+
+/// The centre of the box around triangles.
+fn center_of(positions: &[[DVec3; 3]]) -> DVec3 {
+    let bounds = positions.iter().flatten().fold(None, |bounds: Option<(DVec3, DVec3)>, point| {
+        Some(bounds.map_or((*point, *point), |(lo, hi)| (lo.min(*point), hi.max(*point))))
+    });
+    bounds.map_or(DVec3::ZERO, |(lo, hi)| (lo + hi) / 2.0)
+}
+
+fn box_corners(lo: DVec3, hi: DVec3) -> [DVec3; 8] {
+    std::array::from_fn(|corner| {
+        let pick = |bit: usize, lo, hi| if corner >> bit & 1 == 0 { lo } else { hi };
+        DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z))
+    })
+}
+
+/// The box of an instance in the device's world, rounded outward.
+fn world_box(bounds: &Aabb, transforms: &Transforms) -> Aabb {
+    let corners = box_corners(bounds.lo.as_dvec3(), bounds.hi.as_dvec3());
+    let corners = corners.map(|corner| transforms.world_from_part.transform_point3(corner));
+    let (lo, hi) = corners.iter().fold((corners[0], corners[0]), |(lo, hi), corner| (lo.min(*corner), hi.max(*corner)));
+    let error = lo.abs().max(hi.abs()) * 2.5e-7;
+    Aabb { lo: (lo - error).as_vec3(), hi: (hi + error).as_vec3() }
+}
+
+/// Between the device's world, about its centre, and a part's space, about the part's.
+struct Transforms {
+    world_from_part: DMat4,
+    part_from_world: DMat4,
+}
+
+impl Transforms {
+    fn new(placement: &Placement, part_center: DVec3, world_center: DVec3) -> Self {
+        let world_from_part =
+            DMat4::from_translation(-world_center) * placement.world_from_part * DMat4::from_translation(part_center);
+        Self { world_from_part, part_from_world: world_from_part.inverse() }
+    }
+
+    fn instance(&self, grid: &Grid, root: u32) -> Instance {
+        let row = |matrix: &DMat4, row| matrix.row(row).as_vec4().to_array();
+        let sizes = |matrix: &DMat4| {
+            let matrix = DMat3::from_mat4(*matrix);
+            DMat3::from_cols(matrix.x_axis.abs(), matrix.y_axis.abs(), matrix.z_axis.abs())
+        };
+        let enlarged = sizes(&self.world_from_part) * sizes(&self.part_from_world) * DVec3::ONE;
+        Instance {
+            part_from_world_x: row(&self.part_from_world, 0),
+            part_from_world_y: row(&self.part_from_world, 1),
+            part_from_world_z: row(&self.part_from_world, 2),
+            grid_origin: grid.origin.into(),
+            root,
+            grid_scale: grid.scale.into(),
+            condition: enlarged.max_element() as f32,
+            world_from_part_x: row(&self.world_from_part, 0),
+            world_from_part_y: row(&self.world_from_part, 1),
+            world_from_part_z: row(&self.world_from_part, 2),
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Scene → device buffers, in the layout of `shaders/shared/layout.glsl`.
 
-use super::{Renderer, Tree};
-use crate::bvh::Quantised;
+use super::tree::DeviceTree;
+use super::Renderer;
 use crate::error::Result;
 use crate::layout::{
     self, binding, Features, FAR, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, TILE, TRIANGLE_COLORED,
@@ -18,8 +18,9 @@ pub(super) struct Scene<'a> {
     pub scene: &'a scene::Scene,
     pub soup: &'a Soup,
     pub view: &'a View,
-    pub tree: &'a Tree,
-    pub quantised: &'a Quantised,
+    pub tree: &'a DeviceTree,
+    /// Origin of the device's world.
+    pub center: DVec3,
 }
 
 impl Scene<'_> {
@@ -27,7 +28,7 @@ impl Scene<'_> {
     pub fn buffer(&self, renderer: &Renderer, slot: u32, features: Features) -> Option<Result<Buffer>> {
         let make = |name, bytes: &[u8], usage| Buffer::with_data(&renderer.device, name, bytes, usage);
         Some(match slot {
-            binding::NODES => make("nodes", bytemuck::cast_slice(&self.quantised.records), Usage::Fetch),
+            binding::NODES => make("nodes", bytemuck::cast_slice(&self.tree.records), Usage::Fetch),
             binding::TRIANGLES => make("triangles", bytemuck::cast_slice(&self.triangles()), Usage::Fetch),
             binding::NORMALS => {
                 let normals = if features.smooth_normals { self.per_primitive(&self.soup.normals) } else { Vec::new() };
@@ -36,6 +37,10 @@ impl Scene<'_> {
             binding::COLORS => {
                 let colors = if features.vertex_colors { self.per_primitive(&self.soup.colors) } else { Vec::new() };
                 make("colors", bytemuck::cast_slice(&colors), Usage::Fetch)
+            }
+            binding::INSTANCES => {
+                let instances = if features.instances { self.tree.instances.as_slice() } else { &[] };
+                make("instances", bytemuck::cast_slice(instances), Usage::Fetch)
             }
             binding::FRAME => make("frame", bytemuck::bytes_of(&self.frame()), Usage::Uniform),
             binding::MATERIALS => {
@@ -55,7 +60,7 @@ impl Scene<'_> {
 
     /// A point in the device's world.
     fn local(&self, point: DVec3) -> Vec3 {
-        (point - self.tree.center).as_vec3()
+        (point - self.center).as_vec3()
     }
 
     /// Three texels a triangle in leaf order.
@@ -71,10 +76,11 @@ impl Scene<'_> {
             ];
             let flags = bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
             let extra = [*primitive, soup.materials[index], flags];
-            let texel = |corner: usize| with_bits(self.local(soup.positions[index][corner]), extra[corner]);
+            let center = self.tree.center_of(index);
+            let texel = |corner: usize| with_bits((soup.positions[index][corner] - center).as_vec3(), extra[corner]);
             [texel(0), texel(1), texel(2)]
         };
-        self.tree.bvh.order.par_iter().map(triangle).collect()
+        self.tree.order.par_iter().map(triangle).collect()
     }
 
     /// Three texels a primitive; zeros where the soup has no such data.
@@ -104,8 +110,8 @@ impl Scene<'_> {
             nadir: view.background.radiance(DVec3::NEG_Y).as_vec3().into(),
             zenith: view.background.radiance(DVec3::Y).as_vec3().into(),
             background_alpha: view.background.alpha() as f32,
-            grid_origin: self.quantised.grid.origin.into(),
-            grid_scale: self.quantised.grid.scale.into(),
+            grid_origin: self.tree.grid.origin.into(),
+            grid_scale: self.tree.grid.scale.into(),
         }
     }
 

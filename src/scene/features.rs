@@ -27,6 +27,7 @@ pub fn of(scene: &Scene, soup: &Soup, view: &View) -> Features {
         multisampling: view.samples > 1,
         // These are the renderer's to know.
         deep_tree: false,
+        instances: false,
         retrace: false,
     }
 }

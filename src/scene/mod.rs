@@ -25,7 +25,7 @@ pub use builtin::{built_in, BUILT_IN};
 pub use camera::{Camera, CameraChoice, Projection};
 pub use light::{Light, LightKind};
 pub use material::{Material, Whitted};
-pub use soup::{Soup, TriangleFlags};
+pub use soup::{Instancing, Placement, Soup, TriangleFlags};
 pub use view::View;
 
 use glam::{DMat4, Vec3};

@@ -1,8 +1,10 @@
-//! The triangle soup: every instance's triangles in world space.
+//! The triangle soup: every instance's triangles in world space, or, where many instances share a mesh, its triangles once and
+//! the places where they stand.
 
-use super::{Instance, Scene};
+use super::{Instance, Mesh, Scene};
 use crate::error::{Error, Result};
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
+use std::ops::Range;
 
 /// What is known of a triangle besides its corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -15,20 +17,50 @@ pub struct TriangleFlags {
     pub colored: bool,
 }
 
+/// Where a part of a soup stands.
+#[derive(Clone, Copy, Debug)]
+pub struct Placement {
+    /// Index into [`Soup::parts`].
+    pub part: usize,
+    /// Space of the part's positions to world space.
+    pub world_from_part: DMat4,
+}
+
+/// Whether instances share the triangles of their mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Instancing {
+    /// Where that saves much memory: rays through shared meshes take longer.
+    #[default]
+    Auto,
+    /// Wherever that saves any memory.
+    Shared,
+    /// Never: every instance has its own triangles.
+    Flat,
+}
+
 /// Triangles of all instances, in the order of instances and their meshes. A triangle's number is its *primitive*.
+///
+/// A flat soup is one part, placed once, whose positions are in world space. Otherwise each mesh that instances share is a part
+/// in object space, and what is not shared is one more part in world space.
 #[derive(Clone, Debug, Default)]
 pub struct Soup {
-    /// Corners, world space, counter-clockwise seen from the front.
+    /// Primitives of each part.
+    pub parts: Vec<Range<usize>>,
+    /// Where the parts stand.
+    pub placements: Vec<Placement>,
+    /// Triangles that can be seen: those of a part count as often as it stands somewhere.
+    pub placed: usize,
+    /// Corners in the space of their part, counter-clockwise seen from the front.
     pub positions: Vec<[DVec3; 3]>,
     /// Index into the scene's materials.
     pub materials: Vec<u32>,
     /// Flags.
     pub flags: Vec<TriangleFlags>,
-    /// Unit normals at the corners, world space; zero where not smooth; empty if no triangle is.
+    /// Unit normals at the corners in the space of their part; zero where not smooth; empty if no triangle is.
     pub normals: Vec<[Vec3; 3]>,
     /// Colours at the corners; white where not coloured; empty if no triangle is.
     pub colors: Vec<[Vec3; 3]>,
-    /// Lower corner of the box around everything.
+    /// Lower corner of the box around everything, world space.
     pub lo: DVec3,
     /// Upper corner.
     pub hi: DVec3,
@@ -42,6 +74,14 @@ const MAX_TRIANGLES: usize = 1 << 27;
 /// Sizes between which the kernels' products of three lengths stay within f32.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 
+/// Bytes that a triangle takes on the device: corners and its share of the tree; vertex normals or colours.
+const TRIANGLE_BYTES: usize = 48 + 16;
+const ATTRIBUTE_BYTES: usize = 48;
+/// Bytes that an instance takes on the device: its transforms and its share of the upper tree.
+const INSTANCE_BYTES: usize = 128 + 32;
+/// Bytes that sharing must save before rays are made to pay for it.
+const WORTH_SHARING: usize = 64 << 20;
+
 /// What became of an instance.
 struct Added {
     /// Its transform has no volume: nothing of it was added.
@@ -51,27 +91,60 @@ struct Added {
 }
 
 impl Soup {
-    /// All triangles of a scene. Positions are transformed in f64; normals by the cofactor matrix, which is the inverse
-    /// transpose up to a factor and exists for every matrix; a mirroring transform swaps two corners.
+    /// All triangles of a scene in world space. Positions are transformed in f64; normals by the cofactor matrix, which is the
+    /// inverse transpose up to a factor and exists for every matrix; a mirroring transform swaps two corners.
     ///
     /// # Errors
     /// `Content` when there are more than 2²⁷ triangles, or the scene is too large or too small to be computed.
     pub fn of(scene: &Scene) -> Result<Self> {
-        let count = scene.triangle_count();
+        Self::with(scene, Instancing::Flat)
+    }
+
+    /// The triangles of a scene, those of shared meshes once.
+    ///
+    /// # Errors
+    /// As [`Soup::of`].
+    pub fn with(scene: &Scene, instancing: Instancing) -> Result<Self> {
+        let used = || scene.instances.iter().map(|instance| &scene.meshes[instance.mesh]);
+        let attributes = Attributes {
+            smooth: used().any(|mesh| !mesh.normals.is_empty()),
+            colored: used().any(|mesh| !mesh.colors.is_empty()),
+        };
+        let shared = shared_meshes(scene, instancing, attributes);
+        let is_own = |instance: &&Instance| !shared[instance.mesh];
+        let triangles = |mesh: &Mesh| mesh.triangles.len();
+        let count = scene.instances.iter().filter(is_own).map(|own| triangles(&scene.meshes[own.mesh])).sum::<usize>()
+            + scene
+                .meshes
+                .iter()
+                .zip(&shared)
+                .filter(|(_, shared)| **shared)
+                .map(|(mesh, _)| triangles(mesh))
+                .sum::<usize>();
         if count >= MAX_TRIANGLES {
             return Err(Error::content(&scene.name, format!("{count} triangles: at most {MAX_TRIANGLES}")));
         }
-        let used = || scene.instances.iter().map(|instance| &scene.meshes[instance.mesh]);
-        let smooth = used().any(|mesh| !mesh.normals.is_empty());
-        let colored = used().any(|mesh| !mesh.colors.is_empty());
         let mut soup = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, ..Self::default() };
         soup.positions.reserve(count);
         let mut not_finite = 0;
         let mut flattened = vec![0; scene.meshes.len()];
-        for instance in &scene.instances {
-            let added = soup.add(scene, instance, smooth, colored);
+        for instance in scene.instances.iter().filter(is_own) {
+            let added = soup.add(scene, instance, attributes);
             not_finite += added.not_finite;
             flattened[instance.mesh] += usize::from(added.flattened);
+        }
+        for point in soup.positions.iter().flatten() {
+            soup.lo = soup.lo.min(*point);
+            soup.hi = soup.hi.max(*point);
+        }
+        let own = soup.positions.len();
+        if own > 0 || !shared.contains(&true) {
+            soup.parts.push(0..own);
+            soup.placements.push(Placement { part: 0, world_from_part: DMat4::IDENTITY });
+            soup.placed = own;
+        }
+        for mesh in (0..scene.meshes.len()).filter(|mesh| shared[*mesh]) {
+            not_finite += soup.add_shared(scene, mesh, attributes, &mut flattened[mesh]);
         }
         for (mesh, count) in scene.meshes.iter().zip(flattened).filter(|(_, count)| *count > 0) {
             let name = &mesh.name;
@@ -93,12 +166,40 @@ impl Soup {
         Ok(soup)
     }
 
+    /// Adds a mesh once and all its instances as placements; returns how many triangles are not finite.
+    fn add_shared(&mut self, scene: &Scene, mesh: usize, attributes: Attributes, flattened: &mut usize) -> usize {
+        let first = self.positions.len();
+        let once = Instance { mesh, world_from_object: DMat4::IDENTITY };
+        let not_finite = self.add(scene, &once, attributes).not_finite;
+        let part = self.parts.len();
+        self.parts.push(first..self.positions.len());
+        let mut points: Vec<DVec3> = self.positions[first..].iter().flatten().copied().collect();
+        points.sort_by(|a, b| a.to_array().map(f64::to_bits).cmp(&b.to_array().map(f64::to_bits)));
+        points.dedup();
+        for instance in scene.instances.iter().filter(|instance| instance.mesh == mesh) {
+            if is_flat(&instance.world_from_object) {
+                *flattened += 1;
+                continue;
+            }
+            let world_from_part = instance.world_from_object;
+            for point in &points {
+                let point = world_from_part.transform_point3(*point);
+                self.lo = self.lo.min(point);
+                self.hi = self.hi.max(point);
+            }
+            self.placements.push(Placement { part, world_from_part });
+            self.placed += self.parts[part].len();
+        }
+        not_finite
+    }
+
     /// Adds an instance.
-    fn add(&mut self, scene: &Scene, instance: &Instance, smooth: bool, colored: bool) -> Added {
+    fn add(&mut self, scene: &Scene, instance: &Instance, attributes: Attributes) -> Added {
+        let Attributes { smooth, colored } = attributes;
         let mesh = &scene.meshes[instance.mesh];
         let linear = DMat3::from_mat4(instance.world_from_object);
         let determinant = linear.determinant();
-        if determinant == 0.0 || !determinant.is_finite() {
+        if is_flat(&instance.world_from_object) {
             return Added { flattened: true, not_finite: 0 };
         }
         let cofactors = DMat3::from_cols(
@@ -124,10 +225,6 @@ impl Soup {
                 not_finite += 1;
                 continue;
             }
-            for point in positions {
-                self.lo = self.lo.min(point);
-                self.hi = self.hi.max(point);
-            }
             self.positions.push(positions);
             self.materials.push(mesh.material as u32);
             // A normal without a direction makes the whole triangle flat.
@@ -150,7 +247,12 @@ impl Soup {
         Added { flattened: false, not_finite }
     }
 
-    /// Number of triangles.
+    /// Every triangle is there once, in world space.
+    pub fn is_flat(&self) -> bool {
+        self.placements.len() <= 1
+    }
+
+    /// Number of triangles that are there, however often they are placed.
     pub fn len(&self) -> usize {
         self.positions.len()
     }
@@ -170,4 +272,39 @@ impl Soup {
     pub fn center(&self) -> DVec3 {
         (self.lo + self.hi) / 2.0
     }
+}
+
+/// What some triangle of the soup has besides its corners.
+#[derive(Clone, Copy)]
+struct Attributes {
+    smooth: bool,
+    colored: bool,
+}
+
+/// The transform has no volume.
+fn is_flat(world_from_object: &DMat4) -> bool {
+    let determinant = DMat3::from_mat4(*world_from_object).determinant();
+    determinant == 0.0 || !determinant.is_finite()
+}
+
+/// Which meshes are to be shared.
+fn shared_meshes(scene: &Scene, instancing: Instancing, attributes: Attributes) -> Vec<bool> {
+    let mut instances = vec![0_usize; scene.meshes.len()];
+    let mut may_share = vec![instancing != Instancing::Flat; scene.meshes.len()];
+    for instance in &scene.instances {
+        instances[instance.mesh] += usize::from(!is_flat(&instance.world_from_object));
+        // Positions that overflow are dropped one by one, which needs them one by one.
+        let elements = instance.world_from_object.to_cols_array();
+        may_share[instance.mesh] &= elements.iter().all(|element| element.abs() < 1e12);
+    }
+    let triangle =
+        TRIANGLE_BYTES + ATTRIBUTE_BYTES * (usize::from(attributes.smooth) + usize::from(attributes.colored));
+    let saved = |mesh: usize| {
+        let (bytes, count) = (scene.meshes[mesh].triangles.len() * triangle, instances[mesh]);
+        (bytes * count).saturating_sub(bytes + count * INSTANCE_BYTES)
+    };
+    let all_saved: usize = (0..scene.meshes.len()).filter(|mesh| may_share[*mesh]).map(saved).sum();
+    let worth = instancing == Instancing::Shared
+        || (all_saved > WORTH_SHARING && all_saved > scene.triangle_count() * triangle / 2);
+    (0..scene.meshes.len()).map(|mesh| worth && may_share[mesh] && instances[mesh] > 1 && saved(mesh) > 0).collect()
 }
