@@ -87,9 +87,24 @@ impl Reference {
     }
 }
 
-/// The box around references, and the box around their doubled centres.
-pub(super) fn bounds_of(references: &[Reference]) -> (Box4, Box4) {
-    references.iter().fold((Box4::EMPTY, Box4::EMPTY), |(bounds, centers), reference| {
-        (bounds.union(&reference.bounds()), centers.with_point(reference.doubled_center()))
-    })
+/// What lies in a node.
+pub(super) struct Summary {
+    /// Box around the references.
+    pub bounds: Box4,
+    /// Box around their doubled centres.
+    pub centers: Box4,
+    /// Sum of their boxes' empty surfaces.
+    pub empty_area: f32,
+}
+
+impl Summary {
+    pub fn of(references: &[Reference]) -> Self {
+        let mut summary = Self { bounds: Box4::EMPTY, centers: Box4::EMPTY, empty_area: 0.0 };
+        for reference in references {
+            summary.bounds = summary.bounds.union(&reference.bounds());
+            summary.centers = summary.centers.with_point(reference.doubled_center());
+            summary.empty_area += reference.empty_area();
+        }
+        summary
+    }
 }
