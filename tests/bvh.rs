@@ -1,7 +1,7 @@
 //! The tree: invariants on random and on hostile input.
 
 use glam::Vec3;
-use glimt::bvh::{Aabb, Bvh};
+use glimt::bvh::{Aabb, Bvh, Quality};
 use proptest::prelude::*;
 
 fn point_box(center: Vec3, half: Vec3) -> Aabb {
@@ -84,4 +84,93 @@ fn the_same_tree_on_any_number_of_threads() {
     let (one, four) = (build(1), build(4));
     assert_eq!(one.order, four.order);
     assert!(one.nodes.iter().zip(&four.nodes).all(|(a, b)| a.children == b.children && a.bounds == b.bounds));
+}
+
+const QUALITIES: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::Best];
+
+fn boxes_of(triangles: &[[Vec3; 3]]) -> Vec<Aabb> {
+    triangles.iter().map(|corners| Aabb::of(*corners)).collect()
+}
+
+/// Long thin triangles in all directions through a cube, among small ones.
+fn hay(count: u32) -> Vec<[Vec3; 3]> {
+    let noise = |i: u32, salt: u32| {
+        let hash = (i * 7 + salt).wrapping_mul(2_654_435_761);
+        (hash ^ hash >> 15).wrapping_mul(0x9e37_79b1) as f32 / u32::MAX as f32 - 0.5
+    };
+    (0..count)
+        .map(|i| {
+            let at = Vec3::new(noise(i, 0), noise(i, 1), noise(i, 2)) * 2.0;
+            let along = Vec3::new(noise(i, 3), noise(i, 4), noise(i, 5)) * if i % 3 == 0 { 4.0 } else { 0.05 };
+            let across = Vec3::new(noise(i, 6), noise(i, 1), noise(i, 3)) * 0.02;
+            [at - along, at + along, at + across]
+        })
+        .collect()
+}
+
+#[test]
+fn triangles_that_are_cut_stay_covered() {
+    let triangles = hay(3000);
+    let boxes = boxes_of(&triangles);
+    let mut costs = Vec::new();
+    for quality in QUALITIES {
+        let bvh = Bvh::over_triangles(&triangles, quality);
+        bvh.validate(&boxes, Some(&triangles)).unwrap_or_else(|fault| panic!("{quality:?}: {fault}"));
+        println!("{quality:?}: {} references, SAH {:.1}", bvh.order.len(), bvh.stats().sah_cost);
+        let most = match quality {
+            Quality::Fast => 3000,
+            Quality::Balanced => 3900,
+            Quality::Best => 6000,
+        };
+        assert!(bvh.order.len() <= most, "{quality:?}: {} references", bvh.order.len());
+        costs.push(bvh.stats().sah_cost);
+    }
+    assert!(costs[2] < 0.8 * costs[0] && costs[1] < costs[0], "splits of space pay: {costs:?}");
+}
+
+#[test]
+fn triangles_that_need_no_cut_get_none() {
+    let side = 40;
+    let at = |x: u32, y: u32| Vec3::new(x as f32, (x as f32 * 0.3).sin() + (y as f32 * 0.2).cos(), y as f32);
+    let quads = (0..side).flat_map(|x| (0..side).map(move |y| (x, y)));
+    let triangles: Vec<[Vec3; 3]> = quads
+        .flat_map(|(x, y)| [[at(x, y), at(x, y + 1), at(x + 1, y)], [at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)]])
+        .collect();
+    let (fast, best) = (Bvh::over_triangles(&triangles, Quality::Fast), Bvh::over_triangles(&triangles, Quality::Best));
+    assert!(best.order.len() <= triangles.len() * 101 / 100, "{} references", best.order.len());
+    assert!(best.stats().sah_cost <= fast.stats().sah_cost * 1.001);
+}
+
+#[test]
+fn hostile_triangles_keep_depth_and_memory_bounded() {
+    let needle = |i: u32, scale: f32| {
+        [Vec3::ZERO, Vec3::new(1.0, i as f32 * 1e-6, 1.0) * scale, Vec3::new(1.0, 1.0, i as f32 * 1e-7) * scale]
+    };
+    let nested: Vec<_> = (0..120).map(|i| needle(i, (i as f32 - 60.0).exp2())).collect();
+    let same = vec![[Vec3::ZERO, Vec3::ONE, Vec3::new(1.0, 0.0, 0.5)]; 20_000];
+    let fan: Vec<_> = (0..20_000).map(|i| needle(i, 1.0)).collect();
+    let flat: Vec<_> = (0..5000).map(|i| [Vec3::ZERO, Vec3::X * i as f32, Vec3::X]).collect();
+    for (name, triangles) in
+        [("nested", nested), ("all the same", same), ("a fan", fan), ("without area", flat), ("none", Vec::new())]
+    {
+        for quality in QUALITIES {
+            let bvh = Bvh::over_triangles(&triangles, quality);
+            println!("{name}, {quality:?}: {} references, depth {}", bvh.order.len(), bvh.depth);
+            bvh.validate(&boxes_of(&triangles), Some(&triangles))
+                .unwrap_or_else(|fault| panic!("{name}, {quality:?}: {fault}"));
+            assert!(bvh.order.len() <= 2 * triangles.len());
+        }
+    }
+}
+
+#[test]
+fn cut_triangles_do_not_depend_on_the_number_of_threads() {
+    let triangles = hay(120_000);
+    let build = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Bvh::over_triangles(&triangles, Quality::Best))
+    };
+    let (one, three) = (build(1), build(3));
+    assert!(one.order == three.order && one.order.len() > triangles.len());
+    assert!(one.nodes.iter().zip(&three.nodes).all(|(a, b)| a.children == b.children && a.bounds == b.bounds));
 }

@@ -12,7 +12,7 @@ use glam::Vec3;
 /// Cost of visiting a node, in triangle tests.
 pub(super) const VISIT_COST: f32 = 1.2;
 /// Below this many references a subtree is built by one thread.
-const PARALLEL: usize = 4096;
+const PARALLEL: usize = 16384;
 
 /// Splits of space are tried where the boxes' empty surfaces, together, are so many times the node's: on a
 /// scanned mesh they hardly reach it, among long diagonal triangles it is almost one a triangle.
@@ -44,16 +44,22 @@ pub(super) fn build(space: &mut [Reference], count: usize, recipe: Recipe) -> Bv
     }
     // Leaves were numbered by their place in the space; now the gaps between them are closed.
     let mut order = Vec::with_capacity(count);
-    for node in &mut nodes {
+    let mut depths = vec![1_u8; nodes.len()];
+    for (index, node) in nodes.iter_mut().enumerate() {
         for child in &mut node.children {
-            if let Child::Leaf { first, count } = child {
-                let place = *first as usize;
-                *first = order.len() as u32;
-                order.extend(space[place..][..*count as usize].iter().map(Reference::primitive));
+            match child {
+                Child::Leaf { first, count } => {
+                    let place = *first as usize;
+                    *first = order.len() as u32;
+                    order.extend(space[place..][..*count as usize].iter().map(Reference::primitive));
+                }
+                // A node comes before what is below it.
+                Child::Node(below) => depths[*below as usize] = depths[index] + 1,
             }
         }
     }
-    Bvh { nodes, order, bounds: bounds.aabb() }
+    let depth = depths.into_iter().max().unwrap_or(0).into();
+    Bvh { nodes, order, bounds: bounds.aabb(), depth }
 }
 
 impl Builder<'_> {

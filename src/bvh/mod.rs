@@ -56,6 +56,8 @@ pub struct Bvh {
     pub order: Vec<u32>,
     /// Box around everything.
     pub bounds: Aabb,
+    /// Levels of inner nodes.
+    pub depth: u32,
 }
 
 /// How much work goes into a tree.
@@ -130,7 +132,7 @@ impl Bvh {
         let mut stack = vec![(0_u32, self.bounds, 1_u32)];
         while let Some((index, bounds, depth)) = stack.pop() {
             visited += 1;
-            if depth > MAX_TREE_DEPTH {
+            if depth > MAX_TREE_DEPTH || depth > self.depth {
                 return Err(format!("node {index} lies {depth} deep"));
             }
             let node = self.nodes.get(index as usize).ok_or(format!("no node {index}"))?;

@@ -1,7 +1,7 @@
 //! Splits that give each reference to one side, by the surface area heuristic: over bins along each axis (Wald, On fast
 //! construction of SAH-based bounding volume hierarchies, RT 2007), or over every place between few sorted references.
 
-use super::references::{Box4, Reference};
+use super::references::{in_chunks, Box4, Reference};
 use glam::Vec4;
 
 /// Most bins along an axis; fewer where there are few references.
@@ -138,15 +138,22 @@ fn sweep(references: &[Reference]) -> Option<ObjectSplit> {
 
 fn binned(references: &[Reference], centers: &Box4) -> Option<ObjectSplit> {
     let binning = Binning::over(centers, references.len());
-    let mut bins = [[Bin::EMPTY; BINS]; 3];
-    for reference in references {
-        let bounds = reference.bounds();
-        for (axis, bin) in binning.bins_of(reference).into_iter().enumerate() {
-            let bin = &mut bins[axis][bin];
-            bin.bounds = bin.bounds.union(&bounds);
-            bin.count += 1;
+    let fill = |references: &[Reference]| {
+        let mut bins = [[Bin::EMPTY; BINS]; 3];
+        for reference in references {
+            let one = Bin { bounds: reference.bounds(), count: 1 };
+            for (axis, bin) in binning.bins_of(reference).into_iter().enumerate() {
+                bins[axis][bin] = bins[axis][bin].union(&one);
+            }
         }
-    }
+        bins
+    };
+    let bins = in_chunks(references, fill, |mut all, part| {
+        for (all, part) in all.iter_mut().flatten().zip(part.iter().flatten()) {
+            *all = all.union(part);
+        }
+        all
+    });
     let mut best: Option<ObjectSplit> = None;
     for (axis, bins) in bins.iter().enumerate().filter(|(axis, _)| binning.scale[*axis] > 0.0) {
         let mut right = [Bin::EMPTY; BINS];

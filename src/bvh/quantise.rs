@@ -96,6 +96,7 @@ mod tests {
             }],
             order: vec![0],
             bounds,
+            depth: 1,
         };
         let quantised = quantise(&bvh, Vec3::ZERO, |child| reference(child, 0, 0));
         assert_eq!(quantised.records[0][3], 0xffff_ff5c);

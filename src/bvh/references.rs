@@ -2,6 +2,7 @@
 
 use super::Aabb;
 use glam::{Vec3, Vec4};
+use rayon::prelude::*;
 
 /// A box in SIMD registers, the fourth lane meaning nothing.
 #[derive(Clone, Copy, Debug)]
@@ -87,6 +88,24 @@ impl Reference {
     }
 }
 
+/// References of a node that are worth more than one thread, and how many each looks at.
+const CHUNK: usize = 1 << 15;
+
+/// Computes something of all references; of large nodes in chunks, which do not depend on the number of threads and are merged
+/// in their order.
+pub(super) fn in_chunks<T: Send>(
+    references: &[Reference],
+    compute: impl Fn(&[Reference]) -> T + Sync,
+    merge: impl Fn(T, T) -> T,
+) -> T {
+    if references.len() < 2 * CHUNK {
+        return compute(references);
+    }
+    let (first, rest) = references.split_at(CHUNK);
+    let (first, rest): (T, Vec<T>) = rayon::join(|| compute(first), || rest.par_chunks(CHUNK).map(&compute).collect());
+    rest.into_iter().fold(first, merge)
+}
+
 /// What lies in a node.
 pub(super) struct Summary {
     /// Box around the references.
@@ -98,8 +117,18 @@ pub(super) struct Summary {
 }
 
 impl Summary {
+    const NOTHING: Self = Self { bounds: Box4::EMPTY, centers: Box4::EMPTY, empty_area: 0.0 };
+
     pub fn of(references: &[Reference]) -> Self {
-        let mut summary = Self { bounds: Box4::EMPTY, centers: Box4::EMPTY, empty_area: 0.0 };
+        in_chunks(references, Self::of_chunk, |all, part| Self {
+            bounds: all.bounds.union(&part.bounds),
+            centers: all.centers.union(&part.centers),
+            empty_area: all.empty_area + part.empty_area,
+        })
+    }
+
+    fn of_chunk(references: &[Reference]) -> Self {
+        let mut summary = Self::NOTHING;
         for reference in references {
             summary.bounds = summary.bounds.union(&reference.bounds());
             summary.centers = summary.centers.with_point(reference.doubled_center());

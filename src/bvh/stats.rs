@@ -24,22 +24,16 @@ impl Bvh {
         let mut stats = Stats {
             nodes: self.nodes.len(),
             leaves: 0,
-            depth: 0,
+            depth: self.depth,
             sah_cost: 1.2,
             leaf_sizes: vec![0; MAX_LEAF_TRIANGLES as usize + 1],
         };
         let whole = f64::from(self.bounds.half_area()).max(f64::MIN_POSITIVE);
-        let mut stack = vec![(0_u32, 1_u32)];
-        while let Some((index, depth)) = stack.pop() {
-            stats.depth = stats.depth.max(depth);
-            let node = &self.nodes[index as usize];
+        for node in &self.nodes {
             for (child, bounds) in node.children.iter().zip(&node.bounds) {
                 let share = f64::from(bounds.half_area()) / whole;
                 match *child {
-                    Child::Node(below) => {
-                        stats.sah_cost += 1.2 * share;
-                        stack.push((below, depth + 1));
-                    }
+                    Child::Node(_) => stats.sah_cost += 1.2 * share,
                     Child::Leaf { count, .. } => {
                         stats.leaf_sizes[count as usize] += 1;
                         stats.leaves += usize::from(count > 0);

@@ -91,7 +91,7 @@ impl Tree {
     pub fn features(&self, features: Features) -> Features {
         let instances = features.instances || self.upper.is_some();
         // Besides the nodes there is a mark on the stack where an instance was entered.
-        let depth = self.report().depth + u32::from(instances);
+        let depth = self.depth() + u32::from(instances);
         Features { deep_tree: features.deep_tree || depth > STACK_REGISTERS, instances, ..features }
     }
 
@@ -105,16 +105,20 @@ impl Tree {
         }
     }
 
+    /// Levels on the deepest path through both levels of trees.
+    fn depth(&self) -> u32 {
+        let lower = self.parts.iter().map(|part| part.bvh.depth).max().unwrap_or(0);
+        lower + self.upper.as_ref().map_or(0, |upper| upper.depth)
+    }
+
     /// Counts for a report: the deepest path through both levels; the cost of the tree that rays enter first, with an instance
     /// counted as one triangle.
     pub fn report(&self) -> report::Tree {
-        let lower = self.parts.iter().map(|part| part.bvh.stats());
         let root = self.upper.as_ref().or(self.parts.first().map(|part| &part.bvh)).map(Bvh::stats);
-        let upper_depth = self.upper.as_ref().map_or(0, |upper| upper.stats().depth);
         let nodes = self.size().nodes;
         report::Tree {
             nodes,
-            depth: upper_depth + lower.map(|stats| stats.depth).max().unwrap_or(0),
+            depth: self.depth(),
             sah_cost: root.map_or(0.0, |stats| stats.sah_cost),
             bytes: 32 * nodes as u64,
         }
