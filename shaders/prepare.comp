@@ -6,12 +6,12 @@ void main() {
     if (gl_GlobalInvocationID.x != 0u)
         return;
     for (uint queue = 0u; queue < QUEUES; queue++) {
-        if ((step_now.queues & (1u << queue)) == 0u)
-            continue;
-        uint items = counters[COUNTER_FILLING + queue];
-        counters[COUNTER_FILLING + queue] = 0u;
+        bool is_filled = (step_now.queues & (1u << queue)) != 0u;
+        uint filling = counters[COUNTER_FILLING + queue];
+        uint items = is_filled ? filling : counters[COUNTER_READY + queue];
+        counters[COUNTER_FILLING + queue] = filling - (is_filled ? items : 0u);
         counters[COUNTER_READY + queue] = items;
-        counters[COUNTER_TOTAL + queue] += items;
+        counters[COUNTER_TOTAL + queue] += is_filled ? items : 0u;
         dispatches[queue] = Dispatch((items + WORKGROUP - 1u) / WORKGROUP, 1u, 1u);
     }
 }

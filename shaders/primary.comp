@@ -20,8 +20,8 @@ uint interleaved_workgroup() {
 Ray camera_ray(vec2 point) {
     vec2 plane = vec2(point.x / float(frame.width) * 2.0 - 1.0, 1.0 - point.y / float(frame.height) * 2.0);
     vec3 offset = frame.right * plane.x + frame.up * plane.y;
-    return frame.orthographic != 0u ? Ray(frame.eye + offset, frame.forward)
-                                    : Ray(frame.eye, normalize(frame.forward + offset));
+    float parallel = float(frame.orthographic);
+    return Ray(frame.eye + parallel * offset, normalize(frame.forward + (1.0 - parallel) * offset));
 }
 
 /// The pixel sample of this thread.
@@ -45,8 +45,10 @@ void main() {
     if (place.x >= frame.width || place.y >= frame.height)
         return;
     vec2 inside = vec2(0.5);
-    if (MULTISAMPLING && frame.samples > 1u)
-        inside = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_of_wave);
+    if (MULTISAMPLING) {
+        vec2 stratified = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_of_wave);
+        inside = mix(inside, stratified, bvec2(frame.samples > 1u));
+    }
 
     Ray ray = camera_ray(vec2(place) + inside);
     Hit hit = no_hit(FAR);

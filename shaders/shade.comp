@@ -37,6 +37,11 @@ void queue_reflection_ray(HitItem item, vec3 factor, Surface surface, Material m
         RayItem(leave_surface(surface, direction), item.sample_index, direction, FAR);
 }
 
+/// A condition of the whole dispatch, made one of this thread: see kernel.glsl.
+bool here(bool condition, HitItem item) {
+    return all(bvec2(condition, item.sample_index != NO_ITEM));
+}
+
 /// One thread a hit: ambient and emission at once; a light → shadow queue; the mirror → reflection queue. With several
 /// lights the pass runs once for each, so that a sample never has two shadow items; the first run adds what needs no light, the
 /// last one reflects, because that changes the throughput.
@@ -46,13 +51,13 @@ void main() {
         return;
     HitItem item = hit_item(FETCH(hit_items, index * ITEM_TEXELS), FETCH(hit_items, index * ITEM_TEXELS + 1u));
     vec3 factor = vec3(1.0);
-    if (REFLECTIONS && step_now.reflected != 0u)
-        factor = FETCH_FLOATS(throughputs, item.sample_index).rgb;
+    if (REFLECTIONS)
+        factor = mix(factor, FETCH_FLOATS(throughputs, item.sample_index).rgb, bvec3(step_now.reflected != 0u));
     Surface surface = surface_at(item);
     Material material = material_at(surface.material);
-    if (step_now.first_light != 0u)
+    if (here(step_now.first_light != 0u, item))
         add_radiance(item.sample_index, factor * (material.ambient_tinted * surface.tint + material.emission));
-    if (REFLECTIONS && step_now.reflect != 0u)
+    if (REFLECTIONS && here(step_now.reflect != 0u, item))
         queue_reflection_ray(item, factor, surface, material);
     if (SHADOWS)
         queue_shadow_ray(item, factor, surface, material, light_of(step_now.light));

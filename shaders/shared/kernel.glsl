@@ -1,4 +1,8 @@
 // First include of every kernel: language, contract, workgroup.
+//
+// A rule for all kernels: no branch and no loop depends on the frame's or the step's values alone. Mesa's software Vulkan puts
+// such values into the code and compiles it anew whenever they change, 10 to 40 ms each time. Select instead, or let the
+// condition depend on the thread's own data too.
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
