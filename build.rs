@@ -1,6 +1,8 @@
-//! `shaders/shared/{layout,bindings,features}.glsl` → Rust; `shaders/*.comp` → SPIR-V 1.5, each for both ways of fetching.
+//! `shaders/shared/{layout,bindings,features}.glsl` → Rust; `shaders/*.comp` → SPIR-V 1.5, each for both ways of fetching,
+//! plain and full (see `kernel.glsl`).
 
 use std::fmt::Write;
+use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::{env, error::Error, fs};
 
@@ -33,31 +35,48 @@ fn compile_kernels(out: &Path) -> Result<(), Box<dyn Error>> {
     let compiler = shaderc::Compiler::new()?;
     let mut list = String::new();
     let mut all = Vec::new();
+    let mut hasher = std::hash::DefaultHasher::new();
     for path in &kernels {
         let name = path.file_stem().and_then(|stem| stem.to_str()).ok_or("kernel without a name")?;
-        for (fetch, from_storage) in [("texel", false), ("storage", true)] {
-            let code = compile(&compiler, path, from_storage)?;
-            fs::write(out.join(format!("{name}.{fetch}.spv")), code)?;
+        for (fetch, fetch_macro) in [("texel", None), ("storage", Some("FETCH_FROM_STORAGE"))] {
+            for (variant, variant_macro) in [("plain", Some("PLAIN")), ("full", None)] {
+                let code = compile(&compiler, path, fetch_macro.into_iter().chain(variant_macro))?;
+                code.hash(&mut hasher);
+                fs::write(out.join(format!("{name}.{fetch}.{variant}.spv")), code)?;
+            }
         }
+        let code = |fetch: &str| {
+            let file = |variant: &str| format!("{variant}: include_bytes!(\"{name}.{fetch}.{variant}.spv\")");
+            format!("{fetch}_fetch: SpirV {{ {}, {} }}", file("plain"), file("full"))
+        };
         let constant = name.to_uppercase();
         writeln!(
             list,
             "/// `shaders/{name}.comp`\npub const {constant}: KernelCode = KernelCode {{ name: \"{name}\", \
-             texel_fetch: include_bytes!(\"{name}.texel.spv\"), storage_fetch: include_bytes!(\"{name}.storage.spv\") }};"
+             {}, {} }};",
+            code("texel"),
+            code("storage")
         )?;
         all.push(constant);
     }
     writeln!(list, "/// Every kernel.\npub const ALL: &[KernelCode] = &[{}];", all.join(", "))?;
+    let hash = hasher.finish();
+    writeln!(list, "/// Stands for the code of every kernel.\npub const CODE_HASH: u64 = {hash:#x};")?;
     Ok(fs::write(out.join("kernels.rs"), list)?)
 }
 
-fn compile(compiler: &shaderc::Compiler, path: &Path, fetch_from_storage: bool) -> Result<Vec<u8>, Box<dyn Error>> {
+fn compile<'a>(
+    compiler: &shaderc::Compiler,
+    path: &Path,
+    macros: impl Iterator<Item = &'a str>,
+) -> Result<Vec<u8>, Box<dyn Error>> {
     let mut options = shaderc::CompileOptions::new()?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
-    // Drivers optimise after they have specialised. Optimised before, a kernel keeps traces of what the features switch off:
-    // traversal with instances switched off took 6 % longer.
-    options.set_optimization_level(shaderc::OptimizationLevel::Zero);
-    options.set_generate_debug_info();
+    options.set_optimization_level(shaderc::OptimizationLevel::Performance);
+    // Lines for debuggers make kernels five times as long to read.
+    if env::var("PROFILE")? == "debug" {
+        options.set_generate_debug_info();
+    }
     options.set_warnings_as_errors();
     options.set_include_callback(|requested, _, requesting, _| {
         let folder = Path::new(requesting).parent().ok_or("no folder to include from")?;
@@ -65,9 +84,7 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, fetch_from_storage: bool) 
         let content = fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
         Ok(shaderc::ResolvedInclude { resolved_name: file.display().to_string(), content })
     });
-    if fetch_from_storage {
-        options.add_macro_definition("FETCH_FROM_STORAGE", None);
-    }
+    macros.for_each(|name| options.add_macro_definition(name, None));
     let source = fs::read_to_string(path)?;
     let file = path.display().to_string();
     let artifact = compiler.compile_into_spirv(&source, shaderc::ShaderKind::Compute, &file, "main", Some(&options))?;

@@ -49,7 +49,7 @@ fn rust_offsets_are_the_shaders_offsets() {
         MEMBERS.iter().map(|(s, m, offset)| (((*s).into(), (*m).into()), *offset)).collect();
     let mut checked = std::collections::HashSet::new();
     for kernel in kernels::ALL {
-        for code in [kernel.texel_fetch, kernel.storage_fetch] {
+        for code in [kernel.texel_fetch, kernel.storage_fetch].map(|code| code.full) {
             let module = Module::parse(code);
             for ((structure, member), offset) in &module.offsets {
                 let key = (module.names[structure].clone(), module.members[&(*structure, *member)].clone());
@@ -85,7 +85,7 @@ fn rust_sizes_are_the_shaders_strides() {
     ]);
     let mut checked = std::collections::HashSet::new();
     for kernel in kernels::ALL {
-        let module = Module::parse(kernel.texel_fetch);
+        let module = Module::parse(kernel.texel_fetch.full);
         for (array, stride) in &module.strides {
             let Some(name) = module.elements.get(array).and_then(|element| module.names.get(element)) else { continue };
             if let Some(size) = sizes.get(name.as_str()) {

@@ -33,7 +33,7 @@ pub mod binding {
 
 /// SPIR-V of every kernel, in both ways of fetching.
 pub mod kernels {
-    use super::KernelCode;
+    use super::{KernelCode, SpirV};
     include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
 }
 
@@ -67,7 +67,27 @@ pub struct KernelCode {
     /// File name without `.comp`: also the pass, its timing row and its debug label.
     pub name: &'static str,
     /// SPIR-V that fetches from texel buffers.
-    pub texel_fetch: &'static [u8],
+    pub texel_fetch: SpirV,
     /// SPIR-V that fetches from storage buffers.
-    pub storage_fetch: &'static [u8],
+    pub storage_fetch: SpirV,
+}
+
+/// SPIR-V of a kernel in two variants.
+#[derive(Clone, Copy, Debug)]
+pub struct SpirV {
+    /// Without instances and without tracing again, whatever its specialization constants say.
+    pub plain: &'static [u8],
+    /// With everything.
+    pub full: &'static [u8],
+}
+
+impl SpirV {
+    /// The smallest variant that has these features.
+    pub fn with(&self, features: Features) -> &'static [u8] {
+        if features.instances || features.retrace {
+            self.full
+        } else {
+            self.plain
+        }
+    }
 }

@@ -18,7 +18,7 @@ use crate::film::Film;
 use crate::layout::{binding, BindingKind, Features, KernelCode, RayItem, Step};
 use crate::report::{self, Report};
 use crate::scene::{Scene, Soup, View};
-use crate::vulkan::{BindingSlot, Device, DeviceChoice, Fetch, Habits, Instance, Kernel, Layout, SlotKind};
+use crate::vulkan::{BindingSlot, Cache, Device, DeviceChoice, Fetch, Habits, Instance, Kernel, Layout, SlotKind};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -38,6 +38,7 @@ pub fn render(scene: &Scene, options: &Options) -> Result<(Film, Report)> {
 pub struct Renderer {
     device: Arc<Device>,
     layout: Arc<Layout>,
+    cache: Cache,
     /// Compiled kernels by name and features: a second pipeline of the same code would be compiled again.
     kernels: Mutex<HashMap<(&'static str, Features), Arc<Kernel>>>,
     /// One frame at a time: a frame takes the whole device anyway, and the validation layers of 1.3.239 crash when one
@@ -101,6 +102,7 @@ impl Renderer {
             .collect();
         let layout = Layout::new(&device, &slots, size_of::<Step>() as u32)?;
         Ok(Self {
+            cache: Cache::open(&device, &crate::layout::kernels::CODE_HASH.to_le_bytes()),
             device,
             layout,
             kernels: Mutex::default(),
@@ -124,9 +126,10 @@ impl Renderer {
             Fetch::Texel => code.texel_fetch,
             Fetch::Storage => code.storage_fetch,
         };
+        let spirv = spirv.with(features);
         let constants = features.list().map(|(_, on)| on);
         let name = if features.retrace { "retrace" } else { code.name };
-        let kernel = Arc::new(Kernel::new(&self.layout, name, spirv, &constants)?);
+        let kernel = Arc::new(Kernel::new(&self.layout, &self.cache, name, spirv, &constants)?);
         kernels.insert((code.name, features), kernel.clone());
         Ok(kernel)
     }

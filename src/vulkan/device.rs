@@ -4,6 +4,7 @@ use super::{failed, Instance};
 use crate::error::{Error, Result};
 use ash::{ext::debug_utils, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use sha2::Digest;
 use std::mem::ManuallyDrop;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -97,6 +98,8 @@ pub struct Device {
     pub info: DeviceInfo,
     /// How kernels fetch on this device.
     pub fetch: Fetch,
+    /// What tells this device and driver from others whose compiled kernels do not fit.
+    identity: [u8; 28],
     /// Uploads go through a staging buffer, because the host does not see the device's memory.
     pub(super) staged: bool,
     /// The instance, for its validation messages.
@@ -171,6 +174,15 @@ impl Device {
         let utils = instance.has_debug_utils.then(|| debug_utils::Device::new(&instance.raw, &raw));
         // SAFETY: the physical device belongs to the instance.
         let properties = unsafe { instance.raw.get_physical_device_properties(physical) };
+        let mut identity = [0; 28];
+        identity[..16].copy_from_slice(&properties.pipeline_cache_uuid);
+        for (bytes, id) in identity[16..].chunks_exact_mut(4).zip([
+            properties.vendor_id,
+            properties.device_id,
+            properties.driver_version,
+        ]) {
+            bytes.copy_from_slice(&id.to_le_bytes());
+        }
         let suitable = if info.max_texels >= ENOUGH_TEXELS { Fetch::Texel } else { Fetch::Storage };
         let device = Arc::new(Self {
             raw,
@@ -182,6 +194,7 @@ impl Device {
             memory: Mutex::default(),
             fetch: habits.fetch.unwrap_or(suitable),
             staged: habits.staged.unwrap_or(info.kind == DeviceKind::Discrete),
+            identity,
             info,
             instance: instance.clone(),
         });
@@ -197,6 +210,12 @@ impl Device {
 
     pub(super) fn allocator(&self) -> MutexGuard<'_, Allocator> {
         lock(&self.allocator)
+    }
+
+    /// A name for what this driver compiles for this device out of what `key` stands for.
+    pub(super) fn cache_name(&self, key: &[u8]) -> String {
+        let digest = sha2::Sha256::new().chain_update(self.identity).chain_update(key).finalize();
+        digest.iter().take(16).map(|byte| format!("{byte:02x}")).collect()
     }
 
     /// Gives an object the name that tools and validation messages show.

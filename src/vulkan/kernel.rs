@@ -1,6 +1,6 @@
 //! A compute pipeline from SPIR-V and specialization constants.
 
-use super::{failed, Layout};
+use super::{failed, Cache, Layout};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::Arc;
@@ -18,7 +18,13 @@ impl Kernel {
     ///
     /// # Errors
     /// `Device` when the bytes are no SPIR-V; `Vulkan` when the driver refuses.
-    pub fn new(layout: &Arc<Layout>, name: &'static str, spirv: &[u8], constants: &[bool]) -> Result<Self> {
+    pub fn new(
+        layout: &Arc<Layout>,
+        cache: &Cache,
+        name: &'static str,
+        spirv: &[u8],
+        constants: &[bool],
+    ) -> Result<Self> {
         let device = &layout.device;
         let code = ash::util::read_spv(&mut std::io::Cursor::new(spirv))
             .map_err(|error| Error::Device(format!("kernel {name}: {error}")))?;
@@ -38,8 +44,8 @@ impl Kernel {
             .name(c"main")
             .specialization_info(&specialization);
         let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.pipeline);
-        // SAFETY: module and layout are alive, and the kernel declares only slots of the layout.
-        let created = unsafe { device.raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+        // SAFETY: cache, module and layout are alive, and the kernel declares only slots of the layout.
+        let created = unsafe { device.raw.create_compute_pipelines(cache.raw, &[info], None) };
         // SAFETY: the pipeline does not need its module any more.
         unsafe { device.raw.destroy_shader_module(module, None) };
         let raw = created.map_err(|(_, result)| failed(format!("compile kernel {name}"))(result))?[0];

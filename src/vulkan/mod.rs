@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Instance ─ Device ─┬─ Buffer (memory by gpu-allocator, texel view)
-//!                    ├─ Kernel (pipeline) ─ Layout (descriptor set layout, push constants)
+//!                    ├─ Kernel (pipeline, out of a Cache) ─ Layout (descriptor set layout, push constants)
 //!                    ├─ Bindings (descriptor set)
 //!                    └─ Commands (record: label, bind, dispatch, barrier, timestamp → submit and wait)
 //! ```
@@ -13,6 +13,7 @@
 
 mod bindings;
 mod buffer;
+mod cache;
 mod commands;
 mod device;
 mod instance;
@@ -20,6 +21,7 @@ mod kernel;
 
 pub use bindings::{BindingSlot, Bindings, Layout, SlotKind};
 pub use buffer::{Buffer, Memory, Usage};
+pub use cache::Cache;
 pub use commands::{Access, Commands};
 pub use device::{Device, DeviceChoice, DeviceInfo, DeviceKind, Fetch, Habits};
 pub use instance::Instance;
