@@ -13,10 +13,10 @@ void main() {
     uvec2 place = pixel_place(step_now.first_pixel + pixel);
     if (place.x >= frame.width || place.y >= frame.height)
         return;
-    vec4 sum = mix(film[pixel], vec4(0.0), bvec4(step_now.first_sample == 0u));
+    vec4 sum = mix(FETCH_FLOATS(film_so_far, pixel), vec4(0.0), bvec4(step_now.first_sample == 0u));
     // A bound of this thread, not of the dispatch: see kernel.glsl.
     uint samples = min(step_now.samples, ~pixel);
     for (uint i = 0u; i < samples; i++)
-        sum += radiance[pixel * step_now.samples + i];
+        sum += FETCH_FLOATS(radiances, pixel * step_now.samples + i);
     film[pixel] = sum / (step_now.finish != 0u ? float(frame.samples) : 1.0);
 }

@@ -10,6 +10,8 @@
 #define FETCH(name, index) texelFetch(name, int(index))
 #endif
 #define FETCH_VIEW(slot, name, of) FETCH_BUFFER(slot, name)
+// A texel as floats.
+#define FETCH_FLOATS(name, index) uintBitsToFloat(FETCH(name, index))
 #define STORAGE_BUFFER(slot, type, name) layout(set = 0, binding = slot, scalar) buffer name##_block { type name[]; };
 #define UNIFORM_BUFFER(slot, type, name) layout(set = 0, binding = slot, scalar) uniform name##_block { type name; };
 #define PUSH_CONSTANTS(type, name) layout(push_constant, scalar) uniform name##_block { type name; };
@@ -58,7 +60,11 @@ STORAGE_BUFFER(19, vec4, throughput)
 FETCH_VIEW(20, throughputs, throughput)
 /// Radiance of each pixel sample in flight, alpha = coverage.
 STORAGE_BUFFER(21, vec4, radiance)
+/// The same, to be read; what another thread of the same pass adds is not seen.
+FETCH_VIEW(22, radiances, radiance)
 /// Sum, at the end mean, of each pixel's samples in the band.
-STORAGE_BUFFER(22, vec4, film)
+STORAGE_BUFFER(23, vec4, film)
+/// The same, to be read.
+FETCH_VIEW(24, film_so_far, film)
 
 PUSH_CONSTANTS(Step, step_now)

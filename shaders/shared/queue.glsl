@@ -23,5 +23,5 @@ uint queue_item(uint queue) {
 
 /// Adds light to a pixel sample; the caller holds the sample's only item.
 void add_radiance(uint sample_index, vec3 added) {
-    radiance[sample_index].rgb += added;
+    radiance[sample_index].rgb = FETCH_FLOATS(radiances, sample_index).rgb + added;
 }

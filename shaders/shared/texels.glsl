@@ -1,8 +1,5 @@
 // Structs of the contract from the texels they lie in, member by member in their order.
 
-/// The texel as floats.
-#define FETCH_FLOATS(name, index) uintBitsToFloat(FETCH(name, index))
-
 /// A ray from its queue.
 RayItem ray_item(uvec4 first, uvec4 second) {
     return RayItem(uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), uintBitsToFloat(second.w));
