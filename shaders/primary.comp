@@ -8,23 +8,6 @@
 #include "shared/light.glsl"
 #include "shared/pixel.glsl"
 
-/// Workgroups that stay neighbours when the grid is interleaved.
-const uint STRETCH = 64u;
-
-/// The number of this thread. Stretches of workgroups take even places first, then odd ones: software Vulkan gives each of its
-/// threads one contiguous part of the grid, and so all get their share of every part of the picture. Neighbours in a stretch
-/// meet the same nodes, and caches still hold them. Queues need none of this: passes fill them from all parts of the grid at
-/// once.
-uint interleaved_thread() {
-    uint stretches = gl_NumWorkGroups.x / STRETCH;
-    uint half_count = (stretches + 1u) / 2u;
-    uint own = gl_WorkGroupID.x / STRETCH;
-    uint place = own < half_count ? 2u * own : 2u * (own - half_count) + 1u;
-    // What does not fill a stretch stays where it is.
-    uint stretch = own < stretches ? place : own;
-    return (stretch * STRETCH + gl_WorkGroupID.x % STRETCH) * WORKGROUP + gl_LocalInvocationIndex;
-}
-
 /// The ray through a point of the picture, in pixels from the upper left corner.
 Ray camera_ray(vec2 point) {
     vec2 plane = vec2(point.x / float(frame.width) * 2.0 - 1.0, 1.0 - point.y / float(frame.height) * 2.0);

@@ -12,10 +12,26 @@ uint queue_append(uint queue) {
     return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(lanes);
 }
 
+/// Workgroups that stay neighbours when the grid is interleaved: no divisor or multiple of the tiles in a row of common widths.
+const uint STRETCH = 24u;
+
+/// The number of this thread. Stretches of workgroups take even places first, then odd ones: software Vulkan gives each of its
+/// threads one contiguous part of the grid, and so all get their share of every part of the picture. Neighbours in a stretch
+/// meet the same nodes, and caches still hold them: interleaved one by one, shadow rays took 10 % longer.
+uint interleaved_thread() {
+    uint stretches = gl_NumWorkGroups.x / STRETCH;
+    uint half_count = (stretches + 1u) / 2u;
+    uint own = gl_WorkGroupID.x / STRETCH;
+    uint place = own < half_count ? 2u * own : 2u * (own - half_count) + 1u;
+    // What does not fill a stretch stays where it is.
+    uint stretch = own < stretches ? place : own;
+    return (stretch * STRETCH + gl_WorkGroupID.x % STRETCH) * WORKGROUP + gl_LocalInvocationIndex;
+}
+
 /// The item of this thread, or NO_ITEM when there are fewer. Traced again, it is the one that overflowed.
 const uint NO_ITEM = 0xffffffffu;
 uint queue_item(uint queue) {
-    uint index = gl_GlobalInvocationID.x;
+    uint index = interleaved_thread();
     if (index >= counters[COUNTER_READY + (RETRACE ? QUEUE_RETRACE : queue)])
         return NO_ITEM;
     return RETRACE ? retrace_queue[index] : index;
