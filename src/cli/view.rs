@@ -46,7 +46,7 @@ pub struct ViewArgs {
     #[arg(long)]
     no_default_light: bool,
     /// Pixel samples traced at once: bounds the memory, changes no pixel
-    #[arg(long, value_name = "N", default_value_t = 1 << 18)]
+    #[arg(long, value_name = "N", default_value_t = 1 << 17)]
     samples_in_flight: u32,
     /// How much work goes into the tree; changes no pixel [default: by the numbers of triangles and rays]
     #[arg(long, value_enum)]

@@ -34,7 +34,7 @@ pub struct Options {
     pub device: DeviceChoice,
     /// Validation layers on; any message is an error. Default false.
     pub validate: bool,
-    /// Pixel samples traced at once: bounds the queues' memory, changes no pixel. Default 2¹⁸.
+    /// Pixel samples traced at once: bounds the queues' memory, changes no pixel. Default 2¹⁷.
     pub samples_in_flight: u32,
     /// How much work goes into the tree; `None`: as much as the rays will save. Changes no pixel.
     pub bvh: Option<Quality>,
@@ -61,7 +61,7 @@ impl Default for Options {
             default_light: true,
             device: DeviceChoice::Best,
             validate: false,
-            samples_in_flight: 1 << 18,
+            samples_in_flight: 1 << 17,
             bvh: None,
             instancing: Instancing::Auto,
             all_features: false,
