@@ -11,10 +11,11 @@
 //!
 //! # The data's path
 //! ```text
-//! scene.glb ─scene::gltf→ Scene ─┬─ Soup ──→ boxes ─bvh→ Bvh ──→ quantised records ─┐
-//!                                ├─ View (camera, lights, size)                     ├─ render::upload → device buffers
+//! scene.glb ─scene::gltf→ Scene ─┬─ Soup ─bvh→ Tree (one, or one a shared mesh and one over instances) ─ quantised records ─┐
+//!                                ├─ View (camera, lights, size)                                      render::upload → device buffers
 //!                                └─ Features → specialization constants, passes, buffers (render::Plan)
 //! buffers ─render::frame→ primary → per round { prepare → shade → prepare → shadow; reflection } → resolve → Film → file
+//! buffers ─render::trace→ ray sets through the same kernels → report::Bench
 //! ```
 //! # Rooms, and who may know whom
 //! ```text

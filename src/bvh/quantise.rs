@@ -60,7 +60,7 @@ pub fn reference(child: Child, first_node: u32, first_primitive: u32) -> u32 {
 }
 
 /// Quantises a tree for rays that start at most `reach` away from the origin (units of its boxes, per axis). `refer` makes the
-/// children's references, see [`reference`].
+/// children's references, see [`reference()`].
 pub fn quantise(bvh: &Bvh, reach: Vec3, refer: impl Fn(Child) -> u32 + Sync) -> Quantised {
     let empty = bvh.order.is_empty();
     let bounds = if empty { Aabb { lo: Vec3::ZERO, hi: Vec3::ZERO } } else { bvh.bounds };

@@ -86,6 +86,9 @@ impl BenchArgs {
         let instancing = Instancing::Flat;
         let mut options = Options { interrupted: context.interrupted.clone(), instancing, ..Options::default() };
         options.device = self.device.clone().map_or(DeviceChoice::Best, DeviceChoice::Named);
+        if let Some(folder) = &self.export {
+            std::fs::create_dir_all(folder).map_err(|error| Error::write(folder, error))?;
+        }
         let scene = load_scene(&self.scene, None)?;
         let (prepared, view) = self.prepare(&scene, &options)?;
         let renderer = Renderer::new(&options.device, self.validate)?;
@@ -98,7 +101,7 @@ impl BenchArgs {
         }
         let tree = tree.unwrap_or_else(|| Tree::build(&prepared.soup, self.bvh.into()));
         let mut tracer = renderer.tracer(&scene, &prepared, &tree)?;
-        let mut files = Files::of(&self, &scene.name, &view);
+        let mut files = Files::of(&self, &scene.name);
         let sets = self.trace(&mut tracer, &prepared, &view, &options, &mut files)?;
         if self.validate && !renderer.device().instance.messages().is_empty() {
             return Err(Error::Validation(renderer.device().instance.messages()));
@@ -255,7 +258,7 @@ struct Files<'a> {
 }
 
 impl<'a> Files<'a> {
-    fn of(args: &'a BenchArgs, name: &str, _view: &BenchView) -> Self {
+    fn of(args: &'a BenchArgs, name: &str) -> Self {
         Self { compare: args.compare.as_deref(), export: args.export.as_deref(), name: name.into(), kept: Vec::new() }
     }
 
@@ -318,7 +321,6 @@ impl<'a> Files<'a> {
     /// Writes all that was kept, and the triangles and the view with it.
     fn write(mut self, prepared: &Prepared, view: &BenchView) -> Result<()> {
         let Some(folder) = self.export else { return Ok(()) };
-        std::fs::create_dir_all(folder).map_err(|error| Error::write(folder, error))?;
         let mut triangles = (prepared.soup.len() as u32).to_le_bytes().to_vec();
         for corners in &prepared.soup.positions {
             triangles.extend(corners.iter().flat_map(|corner| corner.as_vec3().to_array()).flat_map(f32::to_le_bytes));

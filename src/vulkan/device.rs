@@ -257,6 +257,7 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> DeviceInfo {
     // SAFETY: the physical device belongs to the instance; the chain is of structures this query fills.
     unsafe { instance.raw.get_physical_device_properties2(physical, &mut properties) };
     let core = properties.properties;
+    let subgroup_operations = subgroup.supported_operations;
     let text = |chars: Result<&std::ffi::CStr, _>| {
         chars.map(|chars: &std::ffi::CStr| chars.to_string_lossy().into_owned()).unwrap_or_default()
     };
@@ -285,7 +286,10 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> DeviceInfo {
             .min(core.limits.max_descriptor_set_storage_buffers),
         unusable: None,
     };
-    info.unusable = unusable(instance, physical, api);
+    let ballots = vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT;
+    let lacks_ballots = || !subgroup_operations.contains(ballots);
+    info.unusable = unusable(instance, physical, api)
+        .or_else(|| lacks_ballots().then(|| "its subgroups have no ballots, which queues are filled by".into()));
     info
 }
 
