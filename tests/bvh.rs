@@ -174,3 +174,18 @@ fn cut_triangles_do_not_depend_on_the_number_of_threads() {
     assert!(one.order == three.order && one.order.len() > triangles.len());
     assert!(one.nodes.iter().zip(&three.nodes).all(|(a, b)| a.children == b.children && a.bounds == b.bounds));
 }
+
+#[test]
+fn the_budget_of_cuts_goes_where_boxes_are_empty() {
+    // Three thousand long triangles, and far away seven times as many small ones that need no cut.
+    let mut triangles = hay(3000);
+    for i in 0..21_000_u32 {
+        let at = Vec3::new(50.0 + (i % 145) as f32, (i / 145) as f32, 0.0);
+        triangles.push([at, at + Vec3::X * 0.9, at + Vec3::Y * 0.9]);
+    }
+    let bvh = Bvh::over_triangles(&triangles, Quality::Balanced);
+    let made = bvh.order.len() - triangles.len();
+    println!("{made} parts of a budget of {}", triangles.len() * 3 / 10);
+    // Shared out by numbers, the long ones would get 900.
+    assert!(made > 2500, "{made} parts");
+}
