@@ -25,11 +25,11 @@ fn host(criterion: &mut Criterion) {
     let scene = ball();
     let soup = Soup::of(&scene).unwrap();
     let boxes: Vec<Aabb> = soup.positions.iter().map(|corners| Aabb::of(corners.map(|c| c.as_vec3()))).collect();
-    let bvh = Bvh::build(&boxes);
+    let bvh = Bvh::over_boxes(&boxes, 6);
     let mut group = criterion.benchmark_group(format!("{} triangles", boxes.len()));
     group.sample_size(10);
     group.bench_function("soup", |bencher| bencher.iter(|| Soup::of(&scene).unwrap()));
-    group.bench_function("build", |bencher| bencher.iter(|| Bvh::build(&boxes)));
+    group.bench_function("build", |bencher| bencher.iter(|| Bvh::over_boxes(&boxes, 6)));
     group.bench_function("quantise", |bencher| {
         bencher.iter(|| quantise(&bvh, glam::Vec3::ONE, |child| reference(child, 0, 0)))
     });

@@ -9,7 +9,7 @@ fn point_box(center: Vec3, half: Vec3) -> Aabb {
 }
 
 fn check(name: &str, boxes: &[Aabb]) -> Bvh {
-    let bvh = Bvh::build(boxes);
+    let bvh = Bvh::over_boxes(boxes, 6);
     bvh.validate(boxes, None).unwrap_or_else(|fault| panic!("{name}: {fault}"));
     let stats = bvh.stats();
     println!("{name}: {} boxes, {} nodes, depth {}, SAH {:.1}", boxes.len(), stats.nodes, stats.depth, stats.sah_cost);
@@ -23,7 +23,7 @@ proptest! {
             .iter()
             .map(|(at, size)| point_box(Vec3::from_array(at.map(f32::from)), Vec3::from_array(size.map(f32::from))))
             .collect();
-        prop_assert_eq!(Bvh::build(&boxes).validate(&boxes, None), Ok(()));
+        prop_assert_eq!(Bvh::over_boxes(&boxes, 6).validate(&boxes, None), Ok(()));
     }
 }
 
@@ -56,7 +56,7 @@ fn hostile_boxes_keep_depth_and_memory_bounded() {
 fn a_broken_tree_is_noticed() {
     let boxes: Vec<Aabb> =
         (0..100).map(|i| point_box(Vec3::new(i as f32, (i * 7 % 13) as f32, 0.0), Vec3::ONE)).collect();
-    let good = Bvh::build(&boxes);
+    let good = Bvh::over_boxes(&boxes, 6);
     let mut swapped = good.clone();
     swapped.order[0] = swapped.order[1];
     assert!(swapped.validate(&boxes, None).is_err());
@@ -79,7 +79,7 @@ fn the_same_tree_on_any_number_of_threads() {
         .collect();
     let build = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Bvh::build(&boxes))
+        pool.install(|| Bvh::over_boxes(&boxes, 6))
     };
     let (one, four) = (build(1), build(4));
     assert_eq!(one.order, four.order);

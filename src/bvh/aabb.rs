@@ -12,7 +12,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box of nothing, neutral in unions.
+    /// The box of nothing.
     pub const EMPTY: Self = Self { lo: Vec3::INFINITY, hi: Vec3::NEG_INFINITY };
 
     /// The smallest box around points.
@@ -20,20 +20,10 @@ impl Aabb {
         points.into_iter().fold(Self::EMPTY, |all, point| Self { lo: all.lo.min(point), hi: all.hi.max(point) })
     }
 
-    /// The smallest box around both.
-    pub fn union(&self, other: &Self) -> Self {
-        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
-    }
-
     /// Half the surface; 0 when empty.
     pub fn half_area(&self) -> f32 {
         let size = (self.hi - self.lo).max(Vec3::ZERO);
         size.x * size.y + size.y * size.z + size.z * size.x
-    }
-
-    /// Twice the centre: enough to compare, and exact where the centre would round.
-    pub fn doubled_center(&self) -> Vec3 {
-        self.lo + self.hi
     }
 
     /// The other box lies inside.

@@ -1,6 +1,6 @@
 //! Boxes or triangles → a binary bounding volume hierarchy over them. Knows no meshes.
 //!
-//! [`Bvh::build`] makes the tree in f32 by the surface area heuristic, [`Bvh::over_triangles`] may also cut triangles; [`quantise`] turns it into the 16-byte child records
+//! [`Bvh::over_boxes`] makes the tree in f32 by the surface area heuristic, [`Bvh::over_triangles`] may also cut triangles; [`quantise`] turns it into the 16-byte child records
 //! that the kernels walk. The tree's depth is bounded, hard, by `MAX_TREE_DEPTH`: the traversal's stack relies on it.
 
 mod aabb;
@@ -92,22 +92,15 @@ impl Quality {
 }
 
 impl Bvh {
-    /// Builds a tree over boxes, in parallel; the same boxes give the same tree on any number of threads.
-    pub fn build(boxes: &[Aabb]) -> Self {
+    /// Builds a tree over boxes with leaves of at most `leaf` where anything separates them, in parallel; the same boxes give
+    /// the same tree on any number of threads.
+    pub fn over_boxes(boxes: &[Aabb], leaf: usize) -> Self {
         let mut references: Vec<Reference> =
             (0..).zip(boxes).map(|(primitive, bounds)| Reference::new(bounds.lo, bounds.hi, primitive)).collect();
-        let recipe = Recipe { leaf: LEAF, spatial: None };
-        build::build(&mut references, boxes.len(), recipe)
+        build::build(&mut references, boxes.len(), Recipe { leaf, spatial: None })
     }
 
-    /// Builds a tree over boxes, each in a leaf of its own.
-    pub fn over_instances(boxes: &[Aabb]) -> Self {
-        let mut references: Vec<Reference> =
-            (0..).zip(boxes).map(|(primitive, bounds)| Reference::new(bounds.lo, bounds.hi, primitive)).collect();
-        build::build(&mut references, boxes.len(), Recipe { leaf: 1, spatial: None })
-    }
-
-    /// Builds a tree over triangles, as [`Bvh::build`]; one that is long may lie in several leaves.
+    /// Builds a tree over triangles, as [`Bvh::over_boxes`]; one that is long may lie in several leaves.
     pub fn over_triangles(triangles: &[[Vec3; 3]], quality: Quality) -> Self {
         let count = triangles.len();
         let (free, overlap) = quality.spatial(count);

@@ -1,7 +1,7 @@
 //! Splits that give each reference to one side, by the surface area heuristic: over bins along each axis (Wald, On fast
 //! construction of SAH-based bounding volume hierarchies, RT 2007), or over every place between few sorted references.
 
-use super::references::{in_chunks, Box4, Reference};
+use super::references::{cells_per_unit, in_chunks, Box4, Reference};
 use glam::Vec4;
 
 /// Most bins along an axis; fewer where there are few references.
@@ -39,10 +39,8 @@ struct Binning {
 impl Binning {
     fn over(centers: &Box4, count: usize) -> Self {
         let bins = (4 + count / 16).min(BINS);
-        let size = centers.hi - centers.lo;
-        // The outer bins are half as wide as the others; 0 where the axis has no extent.
-        let scale = Vec4::splat((bins - 1) as f32) / size;
-        let scale = Vec4::select(scale.is_finite_mask() & size.cmpgt(Vec4::ZERO), scale, Vec4::ZERO);
+        // The outer bins are half as wide as the others.
+        let scale = cells_per_unit(bins - 1, centers.hi - centers.lo);
         Self { origin: centers.lo, scale, bins }
     }
 

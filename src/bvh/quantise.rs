@@ -111,7 +111,7 @@ mod tests {
                 Aabb { lo: at, hi: at + Vec3::new(1.0, 0.001, 0.0) }
             })
             .collect();
-        let bvh = Bvh::build(&boxes);
+        let bvh = Bvh::over_boxes(&boxes, 6);
         for reach in [0.0, 1e3, 1e6, 1e9] {
             let quantised = quantise(&bvh, Vec3::splat(reach), |child| reference(child, 0, 0));
             let world = |coordinates: [u32; 3]| {

@@ -41,6 +41,12 @@ impl Box4 {
     }
 }
 
+/// Cells per unit of length along each axis; 0 where the axis has no extent.
+pub(super) fn cells_per_unit(cells: usize, size: Vec4) -> Vec4 {
+    let scale = Vec4::splat(cells as f32) / size;
+    Vec4::select(scale.is_finite_mask() & size.cmpgt(Vec4::ZERO), scale, Vec4::ZERO)
+}
+
 /// A reference: 32 bytes, the primitive's number and its emptiness in the lanes that the box does not need.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reference {

@@ -1,7 +1,7 @@
 //! Splits of space, which cut triangles in two: Stich, Friedrich and Dietrich, Spatial splits in bounding volume
 //! hierarchies, HPG 2009. Worth their build time where long triangles overlap each other's boxes.
 
-use super::references::{Box4, Reference};
+use super::references::{cells_per_unit, Box4, Reference};
 use glam::{Vec3, Vec4};
 
 /// Most slices of a node's box along each axis, between which planes are tried; fewer where there are few references.
@@ -42,8 +42,7 @@ impl Slicing {
     fn over(bounds: &Box4, count: usize) -> Self {
         let slices = (4 + count / 4).min(SLICES);
         let size = bounds.hi - bounds.lo;
-        let scale = Vec4::splat(slices as f32) / size;
-        let scale = Vec4::select(scale.is_finite_mask() & size.cmpgt(Vec4::ZERO), scale, Vec4::ZERO);
+        let scale = cells_per_unit(slices, size);
         Self { origin: bounds.lo, scale, width: size / slices as f32, slices }
     }
 

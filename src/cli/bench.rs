@@ -1,7 +1,8 @@
 //! `glimt bench`.
 
+use super::machine::MachineArgs;
 use super::values::BvhChoice;
-use super::{load_scene, milliseconds, set_threads, Context, Outcome};
+use super::{load_scene, milliseconds, Context, Outcome};
 use clap::{Args, ValueEnum, ValueHint};
 use glam::{DVec3, Vec3};
 use glimt::render::ray_sets::{BenchRay, BenchView, PrimaryHit, SetKind};
@@ -38,15 +39,8 @@ pub struct BenchArgs {
     /// How much work goes into the tree
     #[arg(long, value_enum, default_value_t = BvhChoice::Best)]
     bvh: BvhChoice,
-    /// Device by index or part of its name [default: the best]
-    #[arg(long, value_name = "NAME|INDEX")]
-    device: Option<String>,
-    /// Switch the Vulkan validation layers on; any message of theirs is an error
-    #[arg(long)]
-    validate: bool,
-    /// Threads for host work and software Vulkan [default: all]
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    machine: MachineArgs,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -81,29 +75,28 @@ const BUILDS: usize = 3;
 impl BenchArgs {
     /// Traces, times, compares.
     pub fn run(self, context: &Context) -> Result<Outcome> {
-        set_threads(self.threads)?;
+        self.machine.set_threads()?;
         // Rays are compared with programs that know triangles alone.
         let instancing = Instancing::Flat;
         let mut options = Options { interrupted: context.interrupted.clone(), instancing, ..Options::default() };
-        options.device = self.device.clone().map_or(DeviceChoice::Best, DeviceChoice::Named);
+        options.device = self.machine.device.clone().map_or(DeviceChoice::Best, DeviceChoice::Named);
         if let Some(folder) = &self.export {
             std::fs::create_dir_all(folder).map_err(|error| Error::write(folder, error))?;
         }
         let scene = load_scene(&self.scene, None)?;
         let (prepared, view) = self.prepare(&scene, &options)?;
-        let renderer = Renderer::new(&options.device, self.validate)?;
-        let mut build_ms = Vec::new();
-        let mut tree = None;
-        for _ in 0..BUILDS {
+        let renderer = Renderer::new(&options.device, self.machine.validate)?;
+        let build = || {
             let start = Instant::now();
-            tree = Some(Tree::build(&prepared.soup, self.bvh.into()));
-            build_ms.push(milliseconds(start));
-        }
-        let tree = tree.unwrap_or_else(|| Tree::build(&prepared.soup, self.bvh.into()));
+            let tree = Tree::build(&prepared.soup, self.bvh.into());
+            (tree, milliseconds(start))
+        };
+        let (tree, first_ms) = build();
+        let build_ms = Spread::of(std::iter::once(first_ms).chain((1..BUILDS).map(|_| build().1))).median;
         let mut tracer = renderer.tracer(&scene, &prepared, &tree)?;
         let mut files = Files::of(&self, &scene.name);
         let sets = self.trace(&mut tracer, &prepared, &view, &options, &mut files)?;
-        if self.validate && !renderer.device().instance.messages().is_empty() {
+        if self.machine.validate && !renderer.device().instance.messages().is_empty() {
             return Err(Error::Validation(renderer.device().instance.messages()));
         }
         files.write(&prepared, &view)?;
@@ -114,7 +107,7 @@ impl BenchArgs {
             sets,
             bvh: BenchTree {
                 builder: tree.quality.name(),
-                build_ms: Spread::of(build_ms).median,
+                build_ms,
                 nodes: report.nodes,
                 bytes: report.bytes,
                 triangle_bytes: 48 * size.triangles as u64,

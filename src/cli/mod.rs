@@ -6,6 +6,7 @@ mod devices;
 mod diff;
 mod explain;
 mod info;
+mod machine;
 mod progress;
 mod render;
 mod values;
@@ -129,18 +130,6 @@ fn load_scene(name: &str, scene_choice: Option<&str>) -> Result<Scene> {
         )),
         error => error,
     })
-}
-
-/// Threads of host work and of software Vulkan; all of the machine's for `None`.
-fn set_threads(threads: Option<usize>) -> Result<()> {
-    let Some(threads) = threads else { return Ok(()) };
-    let refuse = |why: String| Error::Usage(format!("--threads {threads}: {why}"));
-    if !(1..=1024).contains(&threads) {
-        return Err(refuse("must be 1 to 1024".into()));
-    }
-    // Mesa's software Vulkan reads this when the device is opened; until then only Ctrl-C has a thread, which waits.
-    std::env::set_var("LP_NUM_THREADS", threads.to_string());
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|error| refuse(error.to_string()))
 }
 
 fn stop_if_interrupted(options: &Options) -> Result<()> {

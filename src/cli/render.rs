@@ -1,7 +1,8 @@
 //! `glimt render`.
 
+use super::machine::MachineArgs;
 use super::view::ViewArgs;
-use super::{load_scene, milliseconds, progress, set_threads, stop_if_interrupted, Context, Outcome};
+use super::{load_scene, milliseconds, progress, stop_if_interrupted, Context, Outcome};
 use clap::{Args, ValueHint};
 use glimt::film::{Film, Format, Saved};
 use glimt::render::{describe, Prepared, Renderer, Tree};
@@ -23,15 +24,8 @@ pub struct RenderArgs {
     /// Bits a channel of a PNG
     #[arg(long, value_name = "8|16", default_value_t = 8, value_parser = bits)]
     bits: u8,
-    /// Device by index or part of its name, or `reference` for the slow f64 renderer [default: the best]
-    #[arg(long, value_name = "NAME|INDEX")]
-    device: Option<String>,
-    /// Switch the Vulkan validation layers on; any message of theirs is an error
-    #[arg(long)]
-    validate: bool,
-    /// Threads for host work and software Vulkan [default: all]
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    machine: MachineArgs,
     /// Print one JSON object on standard output, nothing else
     #[arg(long)]
     json: bool,
@@ -54,16 +48,16 @@ impl RenderArgs {
     /// Renders, writes, reports.
     pub fn run(self, context: &Context) -> Result<Outcome> {
         let mut options = self.view.options()?;
-        options.validate = self.validate;
+        options.validate = self.machine.validate;
         options.interrupted = context.interrupted.clone();
         options.progress = if self.quiet { None } else { progress::bar() };
         let target = Target::of(&self)?;
         if target.format == Format::Hdr && options.background == Background::Transparent {
             return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
         }
-        set_threads(self.threads)?;
+        self.machine.set_threads()?;
 
-        let (film, mut report) = match self.device.as_deref() {
+        let (film, mut report) = match self.machine.device.as_deref() {
             Some("reference") => self.on_reference(&options)?,
             device => {
                 options.device = device.map_or(DeviceChoice::Best, |name| DeviceChoice::Named(name.into()));

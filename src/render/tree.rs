@@ -82,7 +82,7 @@ impl Tree {
                     world_box(&part.bvh.bounds, &Transforms::new(placement, part.center, center))
                 })
                 .collect();
-            Bvh::over_instances(&boxes)
+            Bvh::over_boxes(&boxes, 1)
         });
         Self { parts, upper, center, quality }
     }
