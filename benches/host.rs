@@ -31,7 +31,7 @@ fn host(criterion: &mut Criterion) {
     group.bench_function("soup", |bencher| bencher.iter(|| Soup::of(&scene).unwrap()));
     group.bench_function("build", |bencher| bencher.iter(|| Bvh::over_boxes(&boxes, 6)));
     group.bench_function("quantise", |bencher| {
-        bencher.iter(|| quantise(&bvh, glam::Vec3::ONE, |child| reference(child, 0, 0)))
+        bencher.iter(|| quantise(&bvh, glam::Vec3::ONE, true, |child| reference(child, 0, 0)))
     });
     group.finish();
     criterion.bench_function("built-in table", |bencher| bencher.iter(|| built_in("table").unwrap()));

@@ -3,6 +3,7 @@
 #include "shared/queue.glsl"
 #include "shared/texels.glsl"
 #include "shared/random.glsl"
+#include "shared/filter.glsl"
 #include "shared/intersect.glsl"
 #include "shared/traverse.glsl"
 #include "shared/light.glsl"
@@ -16,14 +17,10 @@ Ray camera_ray(vec2 point) {
     return Ray(frame.eye + parallel * offset, normalize(frame.forward + (1.0 - parallel) * offset));
 }
 
-/// The pixel sample of this thread.
-uint own_sample() {
-    return RETRACE ? queue_item(QUEUE_RETRACE) : interleaved_thread();
-}
-
 /// One thread a pixel sample: camera ray → nearest hit → hit queue, or background.
 void main() {
-    uint sample_index = own_sample();
+    uint thread = interleaved_thread();
+    uint sample_index = RETRACE ? queue_item(thread, QUEUE_RETRACE) : thread;
     uint pixel = sample_index;
     uint sample_of_wave = 0u;
     if (MULTISAMPLING) {
@@ -38,16 +35,20 @@ void main() {
         return;
     vec2 inside = vec2(0.5);
     if (MULTISAMPLING) {
-        vec2 stratified = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_of_wave);
-        inside = mix(inside, stratified, bvec2(frame.samples > 1u));
+        vec2 point = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_of_wave);
+        if (FILTER)
+            point = filtered(point);
+        inside = mix(inside, point, bvec2(frame.samples > 1u));
     }
 
     Ray ray = camera_ray(vec2(place) + inside);
-    Hit hit = no_hit(FAR);
+    Hit hit = hit_so_far(thread, FAR);
     if (!traverse(ray, false, hit)) {
         retrace_queue[queue_append(QUEUE_RETRACE)] = sample_index;
         return;
     }
+    if (!is_last_part(thread, hit))
+        return;
     bool is_hit = hit.triangle != NO_TRIANGLE;
     radiance[sample_index] = is_hit ? vec4(0.0, 0.0, 0.0, 1.0) : vec4(background(ray.direction), frame.background_alpha);
     if (is_hit)

@@ -8,15 +8,18 @@
 
 /// One thread a reflected ray: nearest hit → hit queue, or background.
 void main() {
-    uint index = queue_item(QUEUE_REFLECTION);
+    uint thread = interleaved_thread();
+    uint index = queue_item(thread, QUEUE_REFLECTION);
     if (index == NO_ITEM)
         return;
     RayItem item = ray_item(FETCH(reflection_items, index * ITEM_TEXELS), FETCH(reflection_items, index * ITEM_TEXELS + 1u));
-    Hit hit = no_hit(item.distance);
+    Hit hit = hit_so_far(thread, item.distance);
     if (!traverse(Ray(item.origin, item.direction), false, hit)) {
         retrace_queue[queue_append(QUEUE_RETRACE)] = index;
         return;
     }
+    if (!is_last_part(thread, hit))
+        return;
     if (hit.triangle != NO_TRIANGLE) {
         hit_queue[queue_append(QUEUE_HIT)] =
             HitItem(item.sample_index, hit.triangle, hit.barycentrics, item.direction, hit.instance);

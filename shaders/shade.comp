@@ -20,7 +20,7 @@ void queue_shadow_ray(HitItem item, vec3 factor, Surface surface, Material mater
     vec3 added = factor * light_sample.irradiance * reflected;
     if (max(added.r, max(added.g, added.b)) <= 0.0)
         return;
-    vec3 origin = leave_surface(surface, light_sample.direction);
+    vec3 origin = leave_towards_light(surface);
     shadow_radiance[item.sample_index].rgb = added;
     shadow_queue[queue_append(QUEUE_SHADOW)] =
         RayItem(origin, item.sample_index, light_sample.direction, light_sample.distance);
@@ -46,7 +46,7 @@ bool here(bool condition, HitItem item) {
 /// lights the pass runs once for each, so that a sample never has two shadow items; the first run adds what needs no light, the
 /// last one reflects, because that changes the throughput.
 void main() {
-    uint index = queue_item(QUEUE_HIT);
+    uint index = queue_item(interleaved_thread(), QUEUE_HIT);
     if (index == NO_ITEM)
         return;
     HitItem item = hit_item(FETCH(hit_items, index * ITEM_TEXELS), FETCH(hit_items, index * ITEM_TEXELS + 1u));

@@ -7,15 +7,18 @@
 
 /// One thread a shadow ray: if nothing blocks the light, what it carries is added to its sample.
 void main() {
-    uint index = queue_item(QUEUE_SHADOW);
+    uint thread = interleaved_thread();
+    uint index = queue_item(thread, QUEUE_SHADOW);
     if (index == NO_ITEM)
         return;
     RayItem item = ray_item(FETCH(shadow_items, index * ITEM_TEXELS), FETCH(shadow_items, index * ITEM_TEXELS + 1u));
-    Hit hit = no_hit(item.distance);
+    Hit hit = hit_so_far(thread, item.distance);
     if (!traverse(Ray(item.origin, item.direction), true, hit)) {
         retrace_queue[queue_append(QUEUE_RETRACE)] = index;
         return;
     }
+    if (!is_last_part(thread, hit))
+        return;
     if (hit.triangle == NO_TRIANGLE)
         add_radiance(item.sample_index, FETCH_FLOATS(shadow_radiances, item.sample_index).rgb);
 }

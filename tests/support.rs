@@ -1,9 +1,9 @@
 //! What several tests need.
 
 use glimt::render::Renderer;
-use glimt::scene::Instancing;
+use glimt::scene::Soup;
 use glimt::vulkan::{DeviceChoice, Fetch, Habits};
-use glimt::{film, reference, render, Film, Options, Report, Scene};
+use glimt::{film, reference, Film, Options, Report, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -32,9 +32,9 @@ pub fn draw(scene: &Scene, options: &Options) -> (Film, Report) {
 
 /// Renders by the reference.
 pub fn draw_reference(scene: &Scene, options: &Options) -> Film {
-    let options = &Options { instancing: Instancing::Flat, ..options.clone() };
-    let prepared = render::Prepared::new(scene, options).unwrap();
-    reference::render(scene, &prepared.soup, &prepared.view, &options.interrupted, None).unwrap()
+    let soup = Soup::of(scene).unwrap();
+    let view = options.view(scene, &soup).unwrap();
+    reference::render(scene, &soup, &view, &options.interrupted, None).unwrap()
 }
 
 /// Fails unless at least 99.9 % of pixels agree within 1/255 and the RMSE is at most 1/255: room for pixels whose centre lies

@@ -66,5 +66,13 @@ FETCH_VIEW(22, radiances, radiance)
 STORAGE_BUFFER(23, vec4, film)
 /// The same, to be read.
 FETCH_VIEW(24, film_so_far, film)
+/// What rounding took from each pixel's sum, with the sum of the weights.
+STORAGE_BUFFER(25, vec4, film_rest)
+/// The same, to be read.
+FETCH_VIEW(26, film_rest_so_far, film_rest)
+/// Offsets from the pixel's centre at which FILTER_STEPS equal parts of a filter's weight end: this one's and the next one's.
+FETCH_BUFFER(27, filter_steps)
+/// Tracing again subtree by subtree: what each ray in the retrace queue has hit so far, two texels.
+STORAGE_BUFFER(28, uvec4, partial_hits)
 
 PUSH_CONSTANTS(Step, step_now)

@@ -21,3 +21,18 @@ layout(constant_id = 7) const bool DEEP_TREE = true;
 layout(constant_id = 8) const bool INSTANCES = true;
 /// The kernel traces again what overflowed, with a stack as deep as any tree: a variant, not a need of the scene.
 layout(constant_id = 9) const bool RETRACE = true;
+/// Sample positions are those of a scrambled Sobol sequence instead of stratified ones.
+layout(constant_id = 10) const bool SOBOL = true;
+/// Sample positions are independent of each other.
+layout(constant_id = 11) const bool INDEPENDENT = true;
+/// Samples are spread as a filter says, not evenly over the pixel.
+layout(constant_id = 12) const bool FILTER = true;
+
+// Safeguards switched off, one by one, to see what they prevent. Never on in a picture.
+
+/// Rays start a fixed distance off the surface.
+layout(constant_id = 13) const bool FIXED_EPSILON = false;
+/// Triangles are tested as Möller and Trumbore do, which lets rays slip through between them.
+layout(constant_id = 14) const bool MOLLER_TRUMBORE = false;
+/// Samples are added up without compensation.
+layout(constant_id = 15) const bool PLAIN_SUMS = false;

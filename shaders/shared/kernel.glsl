@@ -14,6 +14,7 @@
 // traversal took 6 % longer; not optimised at all, pipelines took twice as long to make.
 #define INSTANCES false
 #define RETRACE false
+#define MOLLER_TRUMBORE false
 #endif
 #include "bindings.glsl"
 layout(local_size_x = WORKGROUP) in;

@@ -27,12 +27,14 @@ const uint INSTANCE_TEXELS = 8u;
 /// Texels in a HitItem or a RayItem.
 const uint ITEM_TEXELS = 2u;
 
+/// Bits of a triangle's material word below its flags.
+const uint MATERIAL_BITS = 29u;
 /// Triangle flag: only the front face (counter-clockwise) is seen by camera and reflection rays.
-const uint TRIANGLE_SINGLE_SIDED = 1u;
+const uint TRIANGLE_SINGLE_SIDED = 0x20000000u;
 /// Triangle flag: it has vertex normals.
-const uint TRIANGLE_SMOOTH = 2u;
+const uint TRIANGLE_SMOOTH = 0x40000000u;
 /// Triangle flag: it has vertex colours.
-const uint TRIANGLE_COLORED = 4u;
+const uint TRIANGLE_COLORED = 0x80000000u;
 
 /// Queue of hits that wait to be shaded.
 const uint QUEUE_HIT = 0u;
@@ -50,10 +52,13 @@ const uint COUNTER_FILLING = 0u;
 const uint COUNTER_READY = 4u;
 /// First counter of the items that each queue has had in all.
 const uint COUNTER_TOTAL = 8u;
-/// Counter of rays whose traversal was cut short.
+/// Counter of rays whose second traversal was cut short too.
 const uint COUNTER_LOST = 12u;
 /// Number of counters.
 const uint COUNTERS = 13u;
+
+/// Steps of the table that a filter's sample positions are read from.
+const uint FILTER_STEPS = 1024u;
 
 /// Light kind: all directions from a point.
 const uint LIGHT_POINT = 0u;
@@ -65,7 +70,7 @@ const uint LIGHT_DIRECTIONAL = 2u;
 /// Distance that stands for infinity, in world units.
 const float FAR = 1e30;
 
-/// What is constant during a frame. World space is the scene's, moved so that its centre is the origin.
+/// What is constant during a frame. World space is the scene's, moved to the eye and scaled to size 1.
 struct Frame {
     /// Camera position (perspective) or centre of its plane (orthographic).
     vec3 eye;
@@ -99,6 +104,10 @@ struct Frame {
     vec3 grid_origin;
     /// Quanta per world unit.
     vec3 grid_scale;
+    /// Where the filter crosses 0 and becomes negative, in pixels from its centre; FAR if it never does.
+    float filter_zero;
+    /// The mean weight of a sample.
+    float filter_mean;
 };
 
 /// What changes from dispatch to dispatch: push constants.
@@ -123,6 +132,16 @@ struct Step {
     uint reflected;
     /// resolve: 1 = divide by the number of samples, the band is complete.
     uint finish;
+    /// Chooses between sequences of sample positions.
+    uint seed;
+    /// resolve: the first sample of the picture.
+    uint start;
+    /// Tracing again: reference of the subtree that is walked.
+    uint root;
+    /// Tracing again: 1 = no subtree was walked before.
+    uint first_part;
+    /// Tracing again: 1 = this is the last subtree.
+    uint last_part;
 };
 
 /// Coefficients of Whitted's model: value = constant + tint · tinted, tint being the vertex colour (1 without). Whole texels.

@@ -28,10 +28,9 @@ uint interleaved_thread() {
     return (stretch * STRETCH + gl_WorkGroupID.x % STRETCH) * WORKGROUP + gl_LocalInvocationIndex;
 }
 
-/// The item of this thread, or NO_ITEM when there are fewer. Traced again, it is the one that overflowed.
+/// The item of a thread, or NO_ITEM when there are fewer. Traced again, it is the one that overflowed.
 const uint NO_ITEM = 0xffffffffu;
-uint queue_item(uint queue) {
-    uint index = interleaved_thread();
+uint queue_item(uint index, uint queue) {
     if (index >= counters[COUNTER_READY + (RETRACE ? QUEUE_RETRACE : queue)])
         return NO_ITEM;
     return RETRACE ? retrace_queue[index] : index;

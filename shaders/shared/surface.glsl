@@ -11,6 +11,8 @@ struct Surface {
     /// Vertex colour.
     vec3 tint;
     uint material;
+    /// From position to where shadow rays start: on the curved surface that the vertex normals stand for.
+    vec3 bulge;
 };
 
 vec3 interpolate(vec3 weights, uvec4 a, uvec4 b, uvec4 c) {
@@ -52,6 +54,11 @@ void place_in_world(uint instance, float condition, vec3 magnitude, inout Surfac
     surface.error = 9.6e-7 * condition * max(world.x, max(world.y, world.z));
 }
 
+/// From a point to the plane through a corner across its normal, where the point lies below.
+vec3 rise(vec3 from_corner, vec3 normal) {
+    return -min(dot(from_corner, normal), 0.0) * normal;
+}
+
 Surface surface_at(HitItem item) {
     uint first = item.triangle * TRIANGLE_TEXELS;
     uvec4 texel_a = FETCH(triangles, first);
@@ -62,7 +69,7 @@ Surface surface_at(HitItem item) {
     vec3 c = uintBitsToFloat(texel_c.xyz);
     vec3 weights = vec3(1.0 - item.barycentrics.x - item.barycentrics.y, item.barycentrics);
     uint attributes = texel_a.w * TRIANGLE_TEXELS;
-    uint flags = texel_c.w;
+    uint flags = texel_b.w;
 
     Surface surface;
     // From the barycentrics, never origin + t · direction: the error is then bounded by the triangle's size and place,
@@ -84,6 +91,7 @@ Surface surface_at(HitItem item) {
     vec3 across = cross(edge_b / size_b, edge_c / size_c);
     surface.geometric_normal = normalize(is_placed ? world_normal(item.instance, across) : across);
     surface.normal = surface.geometric_normal;
+    surface.bulge = vec3(0.0);
     if (SMOOTH_NORMALS && (flags & TRIANGLE_SMOOTH) != 0u) {
         vec3 na = FETCH_FLOATS(normals, attributes).xyz;
         vec3 nb = FETCH_FLOATS(normals, attributes + 1u).xyz;
@@ -95,6 +103,12 @@ Surface surface_at(HitItem item) {
             nc = normalize(world_normal(item.instance, nc));
         }
         surface.normal = normalize(weights.x * na + weights.y * nb + weights.z * nc);
+        vec3 point = weights.x * a + weights.y * b + weights.z * c;
+        float front = dot(surface.geometric_normal, item.direction) > 0.0 ? -1.0 : 1.0;
+        mat3 to_world = is_placed ? world_from_part(item.instance) : mat3(1.0);
+        surface.bulge = weights.x * rise(to_world * (point - a), front * na) +
+                        weights.y * rise(to_world * (point - b), front * nb) +
+                        weights.z * rise(to_world * (point - c), front * nc);
     }
     if (dot(surface.geometric_normal, item.direction) > 0.0) {
         surface.geometric_normal = -surface.geometric_normal;
@@ -104,13 +118,24 @@ Surface surface_at(HitItem item) {
     if (VERTEX_COLORS && (flags & TRIANGLE_COLORED) != 0u)
         surface.tint = interpolate(weights, FETCH(colors, attributes), FETCH(colors, attributes + 1u),
                                    FETCH(colors, attributes + 2u));
-    surface.material = texel_b.w;
+    surface.material = bitfieldExtract(texel_b.w, 0, int(MATERIAL_BITS));
     return surface;
+}
+
+/// How far off the surface a ray starts.
+float offset_of(Surface surface) {
+    return FIXED_EPSILON ? 1e-4 : surface.error;
 }
 
 /// Start of a ray that leaves the surface: moved along the geometric normal, to the side the ray goes to, by the error
 /// bound, which grows with the triangle and its distance from the world's origin.
 vec3 leave_surface(Surface surface, vec3 direction) {
     float side = dot(surface.geometric_normal, direction) < 0.0 ? -1.0 : 1.0;
-    return surface.position + surface.geometric_normal * (side * surface.error);
+    return surface.position + surface.geometric_normal * (side * offset_of(surface));
+}
+
+/// Start of a shadow ray: from the curved surface that the vertex normals stand for (Hanika, Ray Tracing Gems II, ch. 4), so that the
+/// flat triangles do not show where light only just reaches it; on the side that is seen.
+vec3 leave_towards_light(Surface surface) {
+    return surface.position + surface.bulge + surface.geometric_normal * offset_of(surface);
 }

@@ -2,7 +2,8 @@
 // nearer child first. The stack is a shift register: ten variables that move up and down, touched with constant indices
 // only, because an indexed array costs software Vulkan eight scalar branches a push. When a live entry falls off its end,
 // the ray goes to the retrace queue, where a variant of the same kernel walks again with an array as deep as the tree can be:
-// rare, and no ray is ever lost.
+// rare, and no ray is ever lost. The same happens to a walk that the driver cut short; if that is still too long, it is done again
+// subtree by subtree.
 
 /// No node: the stack is empty.
 const int NOTHING = int(0x80000000);
@@ -112,22 +113,22 @@ bool visit_leaf(inout Walk walk, int leaf, bool any, inout Hit hit) {
     return found;
 }
 
-/// Counts a ray whose walk was cut short. The host turns a count above zero into an error: a wrong picture is never written.
+/// Whether a walk came to its end.
 ///
 /// Mesa 22.3 silently ends every loop when one invocation, or another in its subgroup, has made 65 535 rounds, nested loops
 /// added up. So every loop here has a second way out, which is never taken: only then does the compiler not take for granted
 /// that a loop ended as it should, and what is left to do behind the loop tells whether it was cut short.
-void check_complete(int node, bool cut) {
-    if (node != NOTHING || cut)
-        atomicAdd(counters[COUNTER_LOST], 1u);
+bool is_complete(int node, bool cut) {
+    return node == NOTHING && !cut;
 }
 
-/// The walk with an array for a stack, as deep as any two trees.
+/// The walk through a subtree with an array for a stack, as deep as any two trees. The host looks at the count of those that
+/// are cut short even so: a wrong picture is never written.
 void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
     int stack[2u * MAX_TREE_DEPTH + 1u];
     int height = 0;
     Walk walk = begin_walk(world_ray);
-    int node = 0;
+    int node = any && hit.triangle != NO_TRIANGLE ? NOTHING : int(step_now.root);
     while (node != NOTHING && node != IMPOSSIBLE) {
         bool found = false;
         if (node >= 0) {
@@ -148,7 +149,8 @@ void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
         }
         node = height > 0 && !(any && found) ? stack[--height] : NOTHING;
     }
-    check_complete(node, walk.cut);
+    if (!is_complete(node, walk.cut))
+        atomicAdd(counters[COUNTER_LOST], 1u);
 }
 
 /// A stack in registers: the top is entry 0.
@@ -172,7 +174,7 @@ void pop(inout Stack stack) {
     stack.entries[REGISTERS - 1] = NOTHING;
 }
 
-/// The walk with registers for a stack; false if it overflowed and is worth nothing.
+/// The walk with registers for a stack; false if it overflowed or was cut short and is worth nothing.
 bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
     Walk walk = begin_walk(world_ray);
     Stack stack;
@@ -209,8 +211,7 @@ bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
             stack.overflow = 0;
         }
     }
-    check_complete(node, walk.cut);
-    return stack.overflow == 0;
+    return is_complete(node, walk.cut) && stack.overflow == 0;
 }
 
 /// Finds the nearest hit, or with `any` some hit, closer than hit.t; a miss leaves hit as it was. False: the ray must be traced
@@ -225,5 +226,29 @@ bool traverse(Ray world_ray, bool any, inout Hit hit) {
 
 /// No hit yet, and none wanted beyond `distance`.
 Hit no_hit(float distance) {
-    return Hit(distance, NO_TRIANGLE, NO_TRIANGLE, vec2(0.0), 0u);
+    return Hit(distance, NO_TRIANGLE, NO_TRIANGLE, vec2(0.0), 0u, NO_TRIANGLE);
+}
+
+/// What a ray that is traced again has hit in the subtrees before, or no hit yet. `index` is its place in the retrace queue.
+Hit hit_so_far(uint index, float distance) {
+    Hit hit = no_hit(distance);
+    if (RETRACE) {
+        uvec4 first = partial_hits[2u * index];
+        uint triangle = step_now.first_part != 0u ? NO_TRIANGLE : first.y;
+        if (triangle != NO_TRIANGLE)
+            hit = Hit(uintBitsToFloat(first.x), triangle, FETCH(triangles, triangle * TRIANGLE_TEXELS).w,
+                      uintBitsToFloat(first.zw), partial_hits[2u * index + 1u].x,
+                      FETCH(triangles, triangle * TRIANGLE_TEXELS + 2u).w);
+    }
+    return hit;
+}
+
+/// Whether the walk is over; otherwise keeps what was hit for the next subtree.
+bool is_last_part(uint index, Hit hit) {
+    if (!RETRACE)
+        return true;
+    partial_hits[2u * index] = uvec4(floatBitsToUint(hit.t), hit.triangle, floatBitsToUint(hit.barycentrics));
+    partial_hits[2u * index + 1u] = uvec4(hit.instance);
+    // A condition of the whole dispatch, made one of this thread: see kernel.glsl.
+    return all(bvec2(step_now.last_part != 0u, index != NO_ITEM));
 }

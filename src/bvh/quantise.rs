@@ -60,19 +60,24 @@ pub fn reference(child: Child, first_node: u32, first_primitive: u32) -> u32 {
 }
 
 /// Quantises a tree for rays that start at most `reach` away from the origin (units of its boxes, per axis). `refer` makes the
-/// children's references, see [`reference()`].
-pub fn quantise(bvh: &Bvh, reach: Vec3, refer: impl Fn(Child) -> u32 + Sync) -> Quantised {
+/// children's references, see [`reference()`]. Without `outward` boxes are rounded to the nearest, and rays are lost.
+pub fn quantise(bvh: &Bvh, reach: Vec3, outward: bool, refer: impl Fn(Child) -> u32 + Sync) -> Quantised {
     let empty = bvh.order.is_empty();
     let bounds = if empty { Aabb { lo: Vec3::ZERO, hi: Vec3::ZERO } } else { bvh.bounds };
-    let half = ((bounds.hi - bounds.lo) / 2.0).as_dvec3();
-    let reach = reach.as_dvec3().max(half);
+    let far = bounds.lo.abs().max(bounds.hi.abs()).as_dvec3();
+    let reach = reach.as_dvec3().max(far);
     // In quanta, as the slab test meets them: distance from the ray's origin to the far side of the grid.
     let rough = Grid::over(&bounds, 1.0);
-    let margin = 0.05 + ((reach + half) * rough.scale.as_dvec3()).max_element() * SLAB_ERROR;
+    let margin = 0.05 + ((reach + far) * rough.scale.as_dvec3()).max_element() * SLAB_ERROR;
     let grid = Grid::over(&bounds, margin + 1.0);
     let record = |bounds: &Aabb, child: &Child| {
-        let lo = (grid.coordinate(bounds.lo) - margin).floor().clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
-        let hi = (grid.coordinate(bounds.hi) + margin).ceil().clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
+        let round = |lower: DVec3, upper: DVec3| match outward {
+            true => ((lower - margin).floor(), (upper + margin).ceil()),
+            false => (lower.round(), upper.round()),
+        };
+        let (lo, hi) = round(grid.coordinate(bounds.lo), grid.coordinate(bounds.hi));
+        let lo = lo.clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
+        let hi = hi.clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
         [lo.x | lo.y << 16, lo.z | hi.x << 16, hi.y | hi.z << 16, refer(*child)]
     };
     let records = bvh
@@ -98,7 +103,7 @@ mod tests {
             bounds,
             depth: 1,
         };
-        let quantised = quantise(&bvh, Vec3::ZERO, |child| reference(child, 0, 0));
+        let quantised = quantise(&bvh, Vec3::ZERO, true, |child| reference(child, 0, 0));
         assert_eq!(quantised.records[0][3], 0xffff_ff5c);
         assert_eq!(quantised.records[1][3], 7);
     }
@@ -113,7 +118,7 @@ mod tests {
             .collect();
         let bvh = Bvh::over_boxes(&boxes, 6);
         for reach in [0.0, 1e3, 1e6, 1e9] {
-            let quantised = quantise(&bvh, Vec3::splat(reach), |child| reference(child, 0, 0));
+            let quantised = quantise(&bvh, Vec3::splat(reach), true, |child| reference(child, 0, 0));
             let world = |coordinates: [u32; 3]| {
                 DVec3::from_array(coordinates.map(f64::from)) / quantised.grid.scale.as_dvec3()
                     + quantised.grid.origin.as_dvec3()

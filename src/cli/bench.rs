@@ -6,7 +6,7 @@ use super::{load_scene, milliseconds, Context, Outcome};
 use clap::{Args, ValueEnum, ValueHint};
 use glam::{DVec3, Vec3};
 use glimt::render::ray_sets::{BenchRay, BenchView, PrimaryHit, SetKind};
-use glimt::render::{describe_device, Met, Prepared, Renderer, Trace, Tracer, Tree};
+use glimt::render::{describe_device, Met, Prepared, Renderer, Trace, Tracer};
 use glimt::report::{Bench, BenchTree, Mismatches, Set, Spread};
 use glimt::scene::{Camera, Instancing, LightKind, Projection};
 use glimt::vulkan::DeviceChoice;
@@ -78,7 +78,12 @@ impl BenchArgs {
         self.machine.set_threads()?;
         // Rays are compared with programs that know triangles alone.
         let instancing = Instancing::Flat;
-        let mut options = Options { interrupted: context.interrupted.clone(), instancing, ..Options::default() };
+        let mut options = Options {
+            interrupted: context.interrupted.clone(),
+            instancing,
+            bvh: Some(self.bvh.into()),
+            ..Options::default()
+        };
         options.device = self.machine.device.clone().map_or(DeviceChoice::Best, DeviceChoice::Named);
         if let Some(folder) = &self.export {
             std::fs::create_dir_all(folder).map_err(|error| Error::write(folder, error))?;
@@ -88,7 +93,7 @@ impl BenchArgs {
         let renderer = Renderer::new(&options.device, self.machine.validate)?;
         let build = || {
             let start = Instant::now();
-            let tree = Tree::build(&prepared.soup, self.bvh.into());
+            let tree = prepared.tree(&options);
             (tree, milliseconds(start))
         };
         let (tree, first_ms) = build();

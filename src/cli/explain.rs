@@ -3,7 +3,7 @@
 use super::view::ViewArgs;
 use super::{load_scene, Outcome};
 use clap::{Args, ValueEnum, ValueHint};
-use glimt::render::{Plan, Prepared, Tree};
+use glimt::render::{Plan, Prepared};
 use glimt::Result;
 use serde_json::json;
 use std::fmt::Write;
@@ -39,8 +39,9 @@ impl ExplainArgs {
     pub fn run(self) -> Result<Outcome> {
         let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
         let options = self.view.options()?;
-        let Prepared { soup, view, features } = Prepared::new(&scene, &options)?;
-        let tree = Tree::build(&soup, options.quality(soup.len()));
+        let prepared = Prepared::new(&scene, &options)?;
+        let tree = prepared.tree(&options);
+        let Prepared { soup, view, features } = prepared;
         let (features, size) = (tree.features(features), tree.size());
         let plan = Plan::new(&scene, &soup, &view, features, size, options.samples_in_flight);
         match if self.json { Form::Json } else { self.format } {

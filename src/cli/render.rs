@@ -5,8 +5,8 @@ use super::view::ViewArgs;
 use super::{load_scene, milliseconds, progress, stop_if_interrupted, Context, Outcome};
 use clap::{Args, ValueHint};
 use glimt::film::{Film, Format, Saved};
-use glimt::render::{describe, Prepared, Renderer, Tree};
-use glimt::scene::{Background, Instancing};
+use glimt::render::{describe, Prepared, Renderer};
+use glimt::scene::{Background, Soup};
 use glimt::vulkan::DeviceChoice;
 use glimt::{reference, report, Error, Options, Report, Result, Scene};
 use std::path::{Path, PathBuf};
@@ -90,7 +90,7 @@ impl RenderArgs {
             let (scene, prepared) = self.load(options)?;
             let load = milliseconds(start);
             let start = Instant::now();
-            let tree = Tree::build(&prepared.soup, options.quality(prepared.soup.len()));
+            let tree = prepared.tree(options);
             let bvh_ms = milliseconds(start);
             stop_if_interrupted(options)?;
             let renderer = device.join().map_err(|_| Error::Device("opening it failed".into()))??;
@@ -102,8 +102,10 @@ impl RenderArgs {
 
     fn on_reference(&self, options: &Options) -> Result<(Film, Report)> {
         let start = Instant::now();
-        let options = &Options { instancing: Instancing::Flat, ..options.clone() };
-        let (scene, Prepared { soup, view, .. }) = self.load(options)?;
+        let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
+        // Not prepared for any device: every triangle as it is.
+        let soup = Soup::of(&scene)?;
+        let view = options.view(&scene, &soup)?;
         let load = milliseconds(start);
         let start = Instant::now();
         let progress = options.progress.as_deref().map(|progress| progress as reference::Progress);

@@ -19,9 +19,10 @@ mod generated_features {
 pub use generated_features::Features;
 
 impl Features {
-    /// Names and values of what a scene may need: all but the variant of a kernel.
+    /// Names and values of what a scene may need: all but the variant of a kernel and safeguards that are off.
     pub fn needs(&self) -> impl Iterator<Item = (&'static str, bool)> {
-        self.list().into_iter().filter(|(name, _)| *name != "retrace")
+        const OTHERS: [&str; 4] = ["retrace", "fixed_epsilon", "moller_trumbore", "plain_sums"];
+        self.list().into_iter().filter(|(name, _)| !OTHERS.contains(name))
     }
 }
 
@@ -75,7 +76,7 @@ pub struct KernelCode {
 /// SPIR-V of a kernel in two variants.
 #[derive(Clone, Copy, Debug)]
 pub struct SpirV {
-    /// Without instances and without tracing again, whatever its specialization constants say.
+    /// Without instances, tracing again and other triangle tests, whatever its specialization constants say.
     pub plain: &'static [u8],
     /// With everything.
     pub full: &'static [u8],
@@ -84,7 +85,7 @@ pub struct SpirV {
 impl SpirV {
     /// The smallest variant that has these features.
     pub fn with(&self, features: Features) -> &'static [u8] {
-        if features.instances || features.retrace {
+        if features.instances || features.retrace || features.moller_trumbore {
             self.full
         } else {
             self.plain

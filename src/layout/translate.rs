@@ -129,17 +129,18 @@ pub fn features(source: &str) -> Result<String, Unknown> {
     let mut id = 0;
     walk("features.glsl", source, |line, doc| {
         let rest = line.strip_prefix(&format!("layout(constant_id = {id}) const bool "))?;
-        let name = rest.strip_suffix(" = true;")?.to_lowercase();
+        let (name, on) = rest.strip_suffix(';')?.split_once(" = ")?;
+        let (name, on) = (name.to_lowercase(), on.parse::<bool>().ok()?);
         id += 1;
         writeln!(fields, "    /// {doc}\n    pub {name}: bool,").ok()?;
         writeln!(list, "            (\"{name}\", self.{name}),").ok()?;
-        writeln!(all, "            {name}: true,").ok()
+        writeln!(all, "            {name}: {on},").ok()
     })?;
     Ok(format!(
         "/// What a scene needs, from `shaders/shared/features.glsl`.\n\
          #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]\npub struct Features {{\n{fields}}}\n\
          impl Features {{\n    /// How many there are.\n    pub const COUNT: usize = {id};\n\n\
-         \x20   /// Every feature on.\n    pub const ALL: Self = Self {{\n{all}        }};\n\n\
+         \x20   /// Every feature on, as the constants are when nothing is said.\n    pub const ALL: Self = Self {{\n{all}        }};\n\n\
          \x20   /// Names and values by specialization constant id.\n    pub fn list(&self) -> [(&'static str, bool); Self::COUNT] {{\n        [\n{list}        ]\n    }}\n}}\n"
     ))
 }

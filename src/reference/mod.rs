@@ -11,7 +11,7 @@ pub use verdict::allows;
 
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::scene::{Background, Light, LightKind, Projection, Scene, Soup, View};
+use crate::scene::{precedence, Background, Light, LightKind, Projection, Scene, Soup, View};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -30,7 +30,9 @@ pub fn render(
     interrupted: &AtomicBool,
     progress: Option<Progress>,
 ) -> Result<Film> {
-    let tracer = Tracer { scene, soup, view, scale: (soup.hi - soup.lo).length().max(1e-30) };
+    let precedence = precedence(scene, soup);
+    let spread = sampling::Spread::new(view);
+    let tracer = Tracer { scene, soup, view, spread, precedence, scale: (soup.hi - soup.lo).length().max(1e-30) };
     let mut film = Film::new(view.width, view.height, view.background == Background::Transparent);
     let done = AtomicU64::new(0);
     film.pixels.par_chunks_mut(view.width as usize).enumerate().try_for_each(|(y, row)| {
@@ -52,6 +54,9 @@ struct Tracer<'a> {
     scene: &'a Scene,
     soup: &'a Soup,
     view: &'a View,
+    spread: sampling::Spread,
+    /// Which of several hits at the same distance is seen.
+    precedence: Vec<u32>,
     /// Size of the scene, to which offsets are relative.
     scale: f64,
 }
@@ -72,24 +77,30 @@ struct Hit {
 impl Tracer<'_> {
     fn pixel(&self, x: u32, y: u32) -> [f32; 4] {
         let view = self.view;
-        let (mut color, mut alpha) = (DVec3::ZERO, 0.0);
-        for index in 0..view.samples {
-            let (dx, dy) =
-                if view.samples == 1 { (0.5, 0.5) } else { sampling::position(view, y * view.width + x, index) };
+        let (mut color, mut alpha, mut weights) = (DVec3::ZERO, 0.0, 0.0);
+        for index in view.first_sample..view.first_sample + view.samples {
+            let (dx, dy, weight) = if view.samples == 1 {
+                (0.5, 0.5, 1.0)
+            } else {
+                sampling::position(view, &self.spread, y * view.width + x, index)
+            };
+            weights += weight;
             let ray = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy);
             match self.nearest(&ray) {
                 Some(hit) => {
-                    color += self.shade(&ray, &hit, 0);
-                    alpha += 1.0;
+                    color += weight * self.shade(&ray, &hit, 0);
+                    alpha += weight;
                 }
                 None => {
-                    color += view.background.radiance(ray.direction);
-                    alpha += view.background.alpha();
+                    color += weight * view.background.radiance(ray.direction);
+                    alpha += weight * view.background.alpha();
                 }
             }
         }
-        let mean = (color / f64::from(view.samples)).as_vec3();
-        [mean.x, mean.y, mean.z, (alpha / f64::from(view.samples)) as f32]
+        let expected = f64::from(view.samples) * self.spread.mean_weight;
+        let divisor = if weights > 0.5 * expected { weights } else { expected };
+        let mean = (color / divisor).as_vec3();
+        [mean.x, mean.y, mean.z, (alpha / divisor) as f32]
     }
 
     fn camera_ray(&self, x: f64, y: f64) -> Ray {
@@ -122,13 +133,15 @@ impl Tracer<'_> {
         (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some((u, v, t, determinant > 0.0))
     }
 
-    /// The nearest hit of all triangles; of several at the same distance the first in the soup.
+    /// The nearest hit of all triangles; of several at the same distance the one that takes precedence, then the first in the soup.
     fn nearest(&self, ray: &Ray) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
         for primitive in 0..self.soup.len() {
             let Some((u, v, t, front)) = self.intersect(ray, primitive) else { continue };
             let seen = front || !self.soup.flags[primitive].single_sided;
-            if seen && nearest.as_ref().is_none_or(|hit| t < hit.t) {
+            let before =
+                |hit: &Hit| t < hit.t || (t == hit.t && self.precedence[primitive] < self.precedence[hit.primitive]);
+            if seen && nearest.as_ref().is_none_or(before) {
                 nearest = Some(Hit { t, primitive, barycentrics: (u, v) });
             }
         }
@@ -149,9 +162,17 @@ impl Tracer<'_> {
         let point = a * weights[0] + b * weights[1] + c * weights[2];
         let mut plane_normal = (b - a).normalize().cross((c - a).normalize()).normalize();
         let mut normal = plane_normal;
+        let front = if plane_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
+        // Where shadow rays start: the mean of the point's projections onto the planes of the corners' normals, as far as
+        // it lies below them (Hanika, Ray Tracing Gems II, ch. 4).
+        let mut raised = point;
         if self.soup.flags[primitive].smooth {
             let corners = self.soup.normals[primitive];
             normal = (0..3).map(|i| corners[i].as_dvec3() * weights[i]).sum::<DVec3>().normalize();
+            for (corner, position) in [a, b, c].into_iter().enumerate() {
+                let upward = corners[corner].as_dvec3() * front;
+                raised -= upward * (weights[corner] * (point - position).dot(upward).min(0.0));
+            }
         }
         if plane_normal.dot(ray.direction) > 0.0 {
             plane_normal = -plane_normal;
@@ -165,17 +186,20 @@ impl Tracer<'_> {
         };
         let material = &self.scene.materials[self.soup.materials[primitive] as usize];
         let whitted = material.whitted(tint);
+        // Far above f64's rounding, far below whatever can be seen.
+        let off = 1e-10 * hit.t + 1e-13 * self.scale;
         let leave = |direction: DVec3| {
             let side = if plane_normal.dot(direction) < 0.0 { -1.0 } else { 1.0 };
-            Ray { origin: point + plane_normal * (side * 1e-9 * self.scale), direction }
+            Ray { origin: point + plane_normal * (side * off), direction }
         };
 
+        let from_curve = |direction: DVec3| Ray { origin: raised + plane_normal * off, direction };
         let mut color = whitted.ambient + material.emission;
         let to_viewer = -ray.direction;
         for light in &self.view.lights {
             let (to_light, distance, irradiance) = arriving(light, point);
             let cosine = normal.dot(to_light);
-            if cosine <= 0.0 || irradiance == DVec3::ZERO || self.blocked(&leave(to_light), distance) {
+            if cosine <= 0.0 || irradiance == DVec3::ZERO || self.blocked(&from_curve(to_light), distance) {
                 continue;
             }
             let halfway = (to_light + to_viewer).normalize();

@@ -22,6 +22,10 @@ pub(super) struct Frame<'a> {
     pub trace: Tracers,
     /// Variants that trace again what overflowed its stack; made when that first happens.
     again: Option<Tracers>,
+    /// Subtrees that tracing again walks through one by one: the whole tree, unless that is too much for one dispatch.
+    parts: Vec<u32>,
+    /// What to do then; `None` where it cannot be divided.
+    smaller_parts: Option<Parts<'a>>,
     prepare: Arc<Kernel>,
     shade: Arc<Kernel>,
     resolve: Arc<Kernel>,
@@ -32,6 +36,9 @@ pub(super) struct Frame<'a> {
     /// Where the host reads: the counters of a wave, then the film of a band.
     read_back: Buffer,
 }
+
+/// Finds the subtrees for rays that are too long for one dispatch, when there are such; `None` where it cannot be divided.
+pub(super) type Parts<'a> = Box<dyn FnOnce() -> Option<Vec<u32>> + 'a>;
 
 /// The kernels that trace rays, as far as the frame has such rays.
 pub(super) struct Tracers {
@@ -67,7 +74,13 @@ const MOST_TIMED: u64 = 16_384;
 
 impl<'a> Frame<'a> {
     /// Allocates and fills the buffers of the plan and makes its kernels.
-    pub fn new(renderer: &'a Renderer, view: &'a View, scene: upload::Scene, plan: Plan) -> Result<Self> {
+    pub fn new(
+        renderer: &'a Renderer,
+        view: &'a View,
+        scene: upload::Scene,
+        plan: Plan,
+        smaller_parts: Parts<'a>,
+    ) -> Result<Self> {
         let features = plan.features;
         let owners = binding::ALL.iter().filter(|slot| slot.view_of.is_none());
         let buffers = plan
@@ -82,8 +95,7 @@ impl<'a> Frame<'a> {
                 buffer.map(|buffer| (slot.slot, buffer))
             })
             .collect::<Result<BTreeMap<_, _>>>()?;
-        let shown = |slot: u32| binding::ALL[slot as usize].view_of.unwrap_or(slot);
-        let bindings = Bindings::new(&renderer.layout, |slot| &buffers[&shown(slot)])?;
+        let bindings = bind(renderer, &buffers)?;
         let read_back = COUNTER_BYTES as u64 + u64::from(plan.band_pixels) * PIXEL_BYTES as u64;
         let read_back = Buffer::new(&renderer.device, "read back", read_back, Usage::Storage, Memory::ReadBack)?;
         Ok(Self {
@@ -91,6 +103,8 @@ impl<'a> Frame<'a> {
             view,
             trace: Tracers::new(renderer, features)?,
             again: None,
+            parts: vec![0],
+            smaller_parts: Some(smaller_parts),
             prepare: renderer.kernel(&kernels::PREPARE, features)?,
             shade: renderer.kernel(&kernels::SHADE, features)?,
             resolve: renderer.kernel(&kernels::RESOLVE, features)?,
@@ -185,40 +199,76 @@ impl<'a> Frame<'a> {
         if let Some(kernel) = self.again.as_ref().and_then(kernel) {
             self.prepare(commands, &[QUEUE_RETRACE]);
             let arguments = self.buffer(binding::DISPATCHES);
-            commands.dispatch_indirect(kernel, bytemuck::bytes_of(&wave), arguments, QUEUE_RETRACE.into());
+            for (index, root) in self.parts.iter().enumerate() {
+                let (first_part, last_part) = (u32::from(index == 0), u32::from(index + 1 == self.parts.len()));
+                let step = Step { root: *root, first_part, last_part, ..wave };
+                commands.dispatch_indirect(kernel, bytemuck::bytes_of(&step), arguments, QUEUE_RETRACE.into());
+                // Partial hits: this part wrote, the next reads.
+                commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
+            }
         }
     }
 
-    /// Whether rays overflowed that nobody traced again: the wave is worth nothing and must be run once more.
+    /// Whether rays overflowed that nobody traced again, or were cut short again: the wave is worth nothing and must be run once
+    /// more.
+    ///
+    /// # Errors
+    /// `Device` when it would not help.
     pub fn must_run_again(&mut self, counters: &[u32]) -> Result<bool> {
         let overflowed = counters[(COUNTER_FILLING + QUEUE_RETRACE) as usize] > 0;
         if overflowed {
             self.again = Some(Tracers::new(self.renderer, Features { retrace: true, ..self.plan.features })?);
+            self.make_partial_hits()?;
+            return Ok(true);
         }
-        Ok(overflowed)
+        let lost = counters[COUNTER_LOST as usize];
+        if lost == 0 {
+            return Ok(false);
+        }
+        self.parts = self.smaller_parts.take().and_then(|parts| parts()).ok_or_else(|| {
+            Error::Device(format!(
+                "{lost} rays meet more boxes and triangles than this driver's loops allow; the picture would be wrong \
+                 and was not written. Where meshes are shared, --instances flat helps"
+            ))
+        })?;
+        Ok(true)
+    }
+
+    /// Allocates what rays that are traced again keep between subtrees.
+    fn make_partial_hits(&mut self) -> Result<()> {
+        let bytes = 2 * 16 * u64::from(self.plan.band_pixels) * u64::from(self.plan.wave_samples);
+        let slot = binding::PARTIAL_HITS;
+        let made = upload::frame_buffer(self.renderer, slot, "partial hits", bytes)?;
+        let old = self.buffers.insert(slot, made);
+        // The old bindings name the old buffer: they go first.
+        self.bindings = bind(self.renderer, &self.buffers)?;
+        drop(old);
+        Ok(())
     }
 
     /// Runs all waves of all bands and collects the film.
     pub fn run(mut self, options: &Options) -> Result<(Film, Outcome)> {
         let Plan { padded_pixels, band_pixels, wave_samples, .. } = self.plan;
-        let samples = self.view.samples;
+        let View { samples, first_sample: start, seed, .. } = *self.view;
         let mut film = Film::new(self.view.width, self.view.height, self.view.background == Background::Transparent);
         let mut totals = Totals::new(&self.plan);
         for first_pixel in (0..padded_pixels).step_by(band_pixels as usize) {
             let pixels = u64::from(band_pixels).min(padded_pixels - first_pixel) as u32;
-            for first_sample in (0..samples).step_by(wave_samples as usize) {
-                let count = wave_samples.min(samples - first_sample);
+            for done in (0..samples).step_by(wave_samples as usize) {
+                let count = wave_samples.min(samples - done);
                 let wave = Step {
                     first_pixel: first_pixel as u32,
                     pixels,
-                    first_sample,
+                    first_sample: start + done,
                     samples: count,
-                    finish: u32::from(first_sample + count == samples),
+                    finish: u32::from(done + count == samples),
+                    seed,
+                    start,
                     ..Step::default()
                 };
                 while !self.run_wave(wave, options, &mut totals)? {}
                 if let Some(progress) = &options.progress {
-                    let done = first_pixel * u64::from(samples) + u64::from(pixels) * u64::from(first_sample + count);
+                    let done = first_pixel * u64::from(samples) + u64::from(pixels) * u64::from(done + count);
                     progress(done, padded_pixels * u64::from(samples));
                 }
             }
@@ -233,7 +283,8 @@ impl<'a> Frame<'a> {
             return Err(Error::Interrupted);
         }
         let dispatches = self.plan.dispatches_of_a_wave(self.view.samples);
-        let timed = if self.again.is_some() { 3 * dispatches } else { dispatches };
+        let again = if self.again.is_some() { 1 + self.parts.len() as u64 } else { 0 };
+        let timed = dispatches * (1 + again);
         let mut commands = Commands::new(&self.renderer.device, timed.min(MOST_TIMED) as usize)?;
         self.record(&mut commands, wave);
         totals.add_times(&commands.submit_and_wait()?);
@@ -242,7 +293,7 @@ impl<'a> Frame<'a> {
         if self.must_run_again(&counters)? {
             return Ok(false);
         }
-        totals.add_counters(&counters)?;
+        totals.add_counters(&counters);
         Ok(true)
     }
 
@@ -272,15 +323,10 @@ fn even_bits(code: usize) -> usize {
     code & 1 | code >> 1 & 2 | code >> 2 & 4
 }
 
-/// Refuses the answers of a wave in which a walk was cut short.
-pub(super) fn all_complete(counters: &[u32]) -> Result<()> {
-    match counters[COUNTER_LOST as usize] {
-        0 => Ok(()),
-        lost => Err(Error::Device(format!(
-            "{lost} rays meet more boxes and triangles than this driver's loops allow; \
-             the picture would be wrong and was not written"
-        ))),
-    }
+/// Descriptors of all slots; views show their owner's buffer.
+fn bind(renderer: &Renderer, buffers: &BTreeMap<u32, Buffer>) -> Result<Bindings> {
+    let shown = |slot: u32| binding::ALL[slot as usize].view_of.unwrap_or(slot);
+    Bindings::new(&renderer.layout, |slot| &buffers[&shown(slot)])
 }
 
 /// Sums over waves.
@@ -308,11 +354,10 @@ impl Totals {
         }
     }
 
-    fn add_counters(&mut self, counters: &[u32]) -> Result<()> {
+    fn add_counters(&mut self, counters: &[u32]) {
         for (queue, total) in self.queued.iter_mut().enumerate() {
             *total += u64::from(counters[COUNTER_TOTAL as usize + queue]);
         }
-        all_complete(counters)
     }
 
     fn outcome(mut self, view: &View, plan: &Plan) -> Outcome {

@@ -8,10 +8,10 @@ mod trace;
 mod tree;
 mod upload;
 
-pub use options::{Options, Progress};
+pub use options::{Options, Progress, Sabotage};
 pub use plan::{LeftOut, Plan, PlannedBuffer, PlannedPass};
 pub use trace::{Met, Trace, Tracer};
-pub use tree::{Tree, TreeSize};
+pub use tree::{Rebase, Tree, TreeSize};
 
 use crate::error::{Error, Result};
 use crate::film::Film;
@@ -63,12 +63,39 @@ impl Prepared {
     /// # Errors
     /// As [`Options::view`] and [`Soup::of`].
     pub fn new(scene: &Scene, options: &Options) -> Result<Self> {
-        let soup = Soup::with(scene, options.instancing)?;
+        let mut soup = Soup::with(scene, options.instancing)?;
         let view = options.view(scene, &soup)?;
-        let features =
-            if options.all_features { Features::ALL } else { crate::scene::features::of(scene, &soup, &view) };
-        let features = Features { retrace: false, ..features };
+        let sabotage = |one| options.sabotage == Some(one);
+        if !sabotage(Sabotage::NoRebase) {
+            soup.dice(view.camera.eye);
+        }
+        let own = crate::scene::features::of(scene, &soup, &view);
+        let features = Features {
+            // Not needs: what was chosen.
+            sobol: own.sobol,
+            independent: own.independent,
+            filter: own.filter,
+            retrace: false,
+            fixed_epsilon: sabotage(Sabotage::FixedEpsilon),
+            moller_trumbore: sabotage(Sabotage::MollerTrumbore),
+            plain_sums: sabotage(Sabotage::PlainSums),
+            ..if options.all_features { Features::ALL } else { own }
+        };
         Ok(Self { soup, view, features })
+    }
+
+    /// Builds its tree.
+    pub fn tree(&self, options: &Options) -> Tree {
+        let Self { soup, view, .. } = self;
+        let sabotage = |one| options.sabotage == Some(one);
+        let rebase = if sabotage(Sabotage::NoRebase) {
+            Rebase { origin: glam::DVec3::ZERO, scale: 1.0 }
+        } else {
+            Rebase::new(soup.lo, soup.hi, view.camera.eye)
+        };
+        let mut tree = Tree::build(soup, rebase, options.quality(soup.len()));
+        tree.rounds_outward = !sabotage(Sabotage::TightBoxes);
+        tree
     }
 }
 
@@ -155,7 +182,7 @@ impl Renderer {
     /// As [`render`].
     pub fn render_prepared(&self, scene: &Scene, prepared: &Prepared, options: &Options) -> Result<(Film, Report)> {
         let start = Instant::now();
-        let tree = Tree::build(&prepared.soup, options.quality(prepared.soup.len()));
+        let tree = prepared.tree(options);
         let bvh_ms = milliseconds(start);
         self.render_with_tree(scene, prepared, options, &tree).map(|(film, mut report)| {
             report.times_ms.bvh = bvh_ms;
@@ -183,8 +210,8 @@ impl Renderer {
         let plan = Plan::new(scene, soup, view, features, tree.size(), in_flight);
         let start = Instant::now();
         let device_tree = tree.for_device(soup, view.camera.eye);
-        let on_device = upload::Scene { scene, soup, view, tree: &device_tree, center: tree.center };
-        let frame = frame::Frame::new(self, view, on_device, plan)?;
+        let on_device = upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase };
+        let frame = frame::Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts()))?;
         let upload = milliseconds(start);
         let start = Instant::now();
         let (film, outcome) = frame.run(options)?;

@@ -2,7 +2,7 @@
 
 use crate::bvh::Quality;
 use crate::error::Result;
-use crate::scene::{Background, CameraChoice, Instancing, Scene, Soup, View};
+use crate::scene::{Background, CameraChoice, Filter, Instancing, Sampler, Scene, Soup, View};
 use crate::vulkan::DeviceChoice;
 use glam::DVec3;
 use std::sync::atomic::AtomicBool;
@@ -10,6 +10,21 @@ use std::sync::Arc;
 
 /// Called with the samples done and the samples in all, some times a second.
 pub type Progress = Arc<dyn Fn(u64, u64) + Send + Sync>;
+
+/// A safeguard that can be switched off to see what it prevents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sabotage {
+    /// Rays start a fixed distance off surfaces, not the bound of the position's error.
+    FixedEpsilon,
+    /// Triangles are tested by Möller and Trumbore's method, which is not watertight.
+    MollerTrumbore,
+    /// Boxes in the tree are rounded to the nearest, not outward.
+    TightBoxes,
+    /// The device's world is the file's, neither moved nor scaled nor diced.
+    NoRebase,
+    /// Samples are added up without compensation.
+    PlainSums,
+}
 
 /// Options of a picture. [`Options::default`] is what `glimt render` does without flags.
 #[derive(Clone)]
@@ -30,6 +45,12 @@ pub struct Options {
     pub background: Background,
     /// A light where the file has none. Default true.
     pub default_light: bool,
+    /// Where samples lie. Default: the one that converges fastest.
+    pub sampler: Sampler,
+    /// How samples are weighed. Default: evenly over the pixel.
+    pub filter: Filter,
+    /// Chooses between samplers' sequences. Default 0.
+    pub seed: u32,
     /// Device. Default: the best.
     pub device: DeviceChoice,
     /// Validation layers on; any message is an error. Default false.
@@ -42,6 +63,8 @@ pub struct Options {
     pub instancing: Instancing,
     /// Every feature on, needed or not: slower, the same picture. For tests.
     pub all_features: bool,
+    /// A safeguard switched off, to see what it prevents. For tests.
+    pub sabotage: Option<Sabotage>,
     /// Progress.
     pub progress: Option<Progress>,
     /// Set to stop early with `Error::Interrupted`.
@@ -59,12 +82,16 @@ impl Default for Options {
             fov: None,
             background: Background::default(),
             default_light: true,
+            sampler: Sampler::default(),
+            filter: Filter::default(),
+            seed: 0,
             device: DeviceChoice::Best,
             validate: false,
             samples_in_flight: 1 << 17,
             bvh: None,
             instancing: Instancing::Auto,
             all_features: false,
+            sabotage: None,
             progress: None,
             interrupted: Arc::default(),
         }
@@ -91,6 +118,7 @@ impl Options {
         let camera = scene.camera(soup, &self.camera, self.up, self.fov, aspect)?;
         let mut view = View::new(scene, camera, self.size, self.samples, self.max_depth)?;
         view.background = self.background;
+        (view.sampler, view.filter, view.seed) = (self.sampler, self.filter, self.seed);
         Ok(if self.default_light { view.with_default_light(scene) } else { view })
     }
 }

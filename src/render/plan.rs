@@ -3,7 +3,8 @@
 
 use super::TreeSize;
 use crate::layout::{
-    Features, HitItem, Light, Material, RayItem, INSTANCE_TEXELS, NODE_TEXELS, TILE, TRIANGLE_TEXELS, WORKGROUP,
+    Features, HitItem, Light, Material, RayItem, FILTER_STEPS, INSTANCE_TEXELS, NODE_TEXELS, TILE, TRIANGLE_TEXELS,
+    WORKGROUP,
 };
 use crate::scene::{Scene, Soup, View};
 
@@ -169,6 +170,10 @@ impl Plan {
         buffer("throughput", queue(features.reflections, PIXEL as usize), true);
         buffer("radiance", in_flight * PIXEL, false);
         buffer("film", u64::from(self.band_pixels) * PIXEL, false);
+        buffer("film_rest", if features.multisampling { u64::from(self.band_pixels) * PIXEL } else { 0 }, false);
+        buffer("filter_steps", if features.filter { u64::from(FILTER_STEPS) * TEXEL } else { 0 }, false);
+        // Made when a walk was too long for one dispatch.
+        buffer("partial_hits", 0, false);
     }
 
     fn explain_left_out(&mut self, view: &View) {
@@ -188,7 +193,14 @@ impl Plan {
         leave(features.single_sided, &["back-face culling"], "all materials are double-sided");
         leave(features.instances, &["instances"], "no mesh is shared, or that would save little");
         leave(features.deep_tree, &["retrace_queue"], "the tree is no deeper than the stack");
-        leave(features.multisampling, &["sample positions"], "one sample a pixel goes through its centre");
+        leave(features.multisampling, &["sample positions", "film_rest"], "one sample a pixel goes through its centre");
+        let even = if features.multisampling {
+            "the pixel's area counts evenly"
+        } else {
+            "one sample a pixel goes through its centre"
+        };
+        leave(features.filter, &["filter_steps"], even);
+        leave(false, &["partial_hits"], "no ray is known to meet more than one dispatch may walk through");
     }
 
     /// Bytes of the queues.

@@ -1,13 +1,13 @@
 //! Ray sets through the very kernels that render: `primary` makes its own rays, `reflection` and `shadow` get theirs in their
 //! queues, filled by the host instead of `shade`.
 
-use super::frame::{all_complete, Frame};
+use super::frame::Frame;
 use super::ray_sets::{BenchRay, SetKind};
-use super::{upload, Options, Plan, Renderer};
+use super::{upload, Options, Plan, Rebase, Renderer};
 use crate::error::{Error, Result};
 use crate::layout::{
-    binding, Features, HitItem, RayItem, Step, COUNTERS, COUNTER_FILLING, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW,
-    WORKGROUP,
+    binding, Features, HitItem, RayItem, Step, COUNTERS, COUNTER_FILLING, FAR, QUEUE_HIT, QUEUE_REFLECTION,
+    QUEUE_SHADOW, WORKGROUP,
 };
 use crate::scene::{Scene, View};
 use crate::vulkan::{Access, Buffer, Commands, Kernel};
@@ -19,7 +19,7 @@ use std::time::Instant;
 pub struct Tracer<'a> {
     frame: Frame<'a>,
     prepared: &'a super::Prepared,
-    center: DVec3,
+    rebase: Rebase,
     /// Primitives in leaf order.
     order: Vec<u32>,
 }
@@ -60,7 +60,7 @@ impl Renderer {
         &'a self,
         scene: &'a Scene,
         prepared: &'a super::Prepared,
-        tree: &super::Tree,
+        tree: &'a super::Tree,
     ) -> Result<Tracer<'a>> {
         let View { width, height, .. } = prepared.view;
         let features = tree.features(Features { shadows: true, reflections: true, ..Features::default() });
@@ -70,9 +70,9 @@ impl Renderer {
         }
         let (soup, view) = (&prepared.soup, &prepared.view);
         let device_tree = tree.for_device(soup, view.camera.eye);
-        let on_device = upload::Scene { scene, soup, view, tree: &device_tree, center: tree.center };
-        let frame = Frame::new(self, view, on_device, plan)?;
-        Ok(Tracer { frame, prepared, center: tree.center, order: device_tree.order })
+        let on_device = upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase };
+        let frame = Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts()))?;
+        Ok(Tracer { frame, prepared, rebase: tree.rebase, order: device_tree.order })
     }
 }
 
@@ -82,7 +82,7 @@ impl Tracer<'_> {
     /// # Errors
     /// `Device` when the rays do not fit or one is lost; `Vulkan` when the device fails.
     pub fn trace(&mut self, kind: SetKind, rays: &[BenchRay], runs: usize, options: &Options) -> Result<Trace> {
-        let input = Input::new(self.frame.renderer, kind, rays, self.center)?;
+        let input = Input::new(self.frame.renderer, kind, rays, self.rebase)?;
         if rays.len() > (self.prepared.view.width * self.prepared.view.height) as usize {
             return Err(Error::Device(format!("{} rays do not fit into the queue", rays.len())));
         }
@@ -96,7 +96,6 @@ impl Tracer<'_> {
             let (wall, device) = self.run(kind, rays.len() as u32)?;
             let counters = upload::read_back(self.frame.renderer, self.frame.buffer(binding::COUNTERS))?;
             let counters: &[u32] = bytemuck::cast_slice(counters.read()?);
-            all_complete(counters)?;
             if self.frame.must_run_again(counters)? {
                 continue;
             }
@@ -205,12 +204,12 @@ struct Input {
 }
 
 impl Input {
-    fn new(renderer: &Renderer, kind: SetKind, rays: &[BenchRay], center: DVec3) -> Result<Self> {
+    fn new(renderer: &Renderer, kind: SetKind, rays: &[BenchRay], rebase: Rebase) -> Result<Self> {
         let item = |(ray, sample_index): (&BenchRay, u32)| RayItem {
-            origin: (DVec3::from(Vec3::from(ray.origin)) - center).as_vec3().into(),
+            origin: rebase.point(DVec3::from(Vec3::from(ray.origin))).into(),
             sample_index,
             direction: ray.direction,
-            distance: ray.t_max,
+            distance: (f64::from(ray.t_max) * rebase.scale).min(f64::from(FAR)) as f32,
         };
         let queue = match kind {
             SetKind::Primary => None,

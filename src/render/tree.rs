@@ -1,7 +1,8 @@
 //! The trees over a soup, and what the device gets of them.
 //!
 //! A flat soup has one tree over its triangles in the device's world. Where instances share parts, each part has a tree in its
-//! own space, about its own centre, and an upper tree over the instances' boxes has one instance in each leaf.
+//! own space, about its own centre, and an upper tree over the instances' boxes has one instance in each leaf. Every space of the
+//! device is a [`Rebase`] of one of the scene's.
 
 use crate::bvh::{quantise, reference, Aabb, Bvh, Child, Grid, Quality};
 use crate::layout::{Features, Instance, LEAF_IS_INSTANCE, STACK_REGISTERS};
@@ -15,17 +16,59 @@ pub struct Tree {
     parts: Vec<Part>,
     /// Over the placements; `None` for a flat soup.
     upper: Option<Bvh>,
-    /// Origin of the device's world, in world space: the soup's centre.
-    pub center: DVec3,
+    /// From world space to the device's.
+    pub rebase: Rebase,
     /// How it was built.
     pub quality: Quality,
+    /// Boxes are rounded outward when they become coarser, as they must.
+    pub rounds_outward: bool,
 }
+
+/// Rounds of loops that no driver cuts short: Mesa 22.3 ends them after 65 535.
+const MOST_ROUNDS: u64 = 60_000;
+/// Rays that such a driver runs side by side at most.
+const LANES: u64 = 16;
 
 /// The tree over a part of the soup.
 struct Part {
     bvh: Bvh,
-    /// Origin of its boxes, in the part's space.
-    center: DVec3,
+    /// From the part's space to the device's for it.
+    rebase: Rebase,
+}
+
+/// A space on the device: one of the scene's, moved and scaled in f64 so that f32 is spent on what is seen, not on where the
+/// scene stands or in which units it is. The scale is a power of two, which rounds nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rebase {
+    /// What becomes the origin.
+    pub origin: DVec3,
+    /// Device lengths a length of the scene.
+    pub scale: f64,
+}
+
+impl Rebase {
+    /// For what lies between two corners and is seen from `eye`: the eye itself becomes the origin, or what is nearest to it, so that
+    /// rounding errors are in proportion to the distance from it, as the sizes of things in the picture are.
+    pub fn new(lo: DVec3, hi: DVec3, eye: DVec3) -> Self {
+        let size = (hi - lo).max_element();
+        let exponent = if size > 0.0 && size.is_finite() { size.log2().floor() } else { 0.0 };
+        Self { origin: eye.clamp(lo, hi), scale: (-exponent).exp2() }
+    }
+
+    /// A point.
+    pub fn point(&self, point: DVec3) -> Vec3 {
+        self.exact(point).as_vec3()
+    }
+
+    /// A point, not yet rounded.
+    fn exact(&self, point: DVec3) -> DVec3 {
+        (point - self.origin) * self.scale
+    }
+
+    /// As a matrix.
+    fn matrix(&self) -> DMat4 {
+        DMat4::from_scale(DVec3::splat(self.scale)) * DMat4::from_translation(-self.origin)
+    }
 }
 
 /// Sizes on the device.
@@ -49,28 +92,31 @@ pub(super) struct DeviceTree {
     pub order: Vec<u32>,
     /// In the order of the upper tree's leaves.
     pub instances: Vec<Instance>,
-    /// Origin of each primitive's positions, by part: its first primitive and the origin.
-    centers: Vec<(usize, DVec3)>,
+    /// The space of each primitive's positions, by part: its first primitive and the space.
+    rebases: Vec<(usize, Rebase)>,
 }
 
 impl DeviceTree {
-    /// Origin of a primitive's positions on the device, in the space of its part.
-    pub fn center_of(&self, primitive: usize) -> DVec3 {
-        let part = self.centers.partition_point(|(first, _)| *first <= primitive);
-        self.centers[part - 1].1
+    /// From the space of a primitive's part to the device's.
+    pub fn rebase_of(&self, primitive: usize) -> Rebase {
+        let part = self.rebases.partition_point(|(first, _)| *first <= primitive);
+        self.rebases[part - 1].1
     }
 }
 
 impl Tree {
-    /// Builds the trees over a soup.
-    pub fn build(soup: &Soup, quality: Quality) -> Self {
-        let center = soup.center();
+    /// Builds the trees over a soup in a world of the device's.
+    pub fn build(soup: &Soup, rebase: Rebase, quality: Quality) -> Self {
         let part = |range: &std::ops::Range<usize>| {
             let positions = &soup.positions[range.clone()];
-            let center = if soup.is_flat() { center } else { center_of(positions) };
-            let local = |corners: &[DVec3; 3]| corners.map(|corner| (corner - center).as_vec3());
+            let own = || {
+                let (lo, hi) = bounds_of(positions);
+                Rebase::new(lo, hi, (lo + hi) / 2.0)
+            };
+            let rebase = if soup.is_flat() { rebase } else { own() };
+            let local = |corners: &[DVec3; 3]| corners.map(|corner| rebase.point(corner));
             let triangles: Vec<[Vec3; 3]> = positions.par_iter().map(local).collect();
-            Part { bvh: Bvh::over_triangles(&triangles, quality), center }
+            Part { bvh: Bvh::over_triangles(&triangles, quality), rebase }
         };
         let parts: Vec<Part> = soup.parts.par_iter().map(part).collect();
         let upper = (!soup.is_flat()).then(|| {
@@ -79,12 +125,12 @@ impl Tree {
                 .par_iter()
                 .map(|placement| {
                     let part = &parts[placement.part];
-                    world_box(&part.bvh.bounds, &Transforms::new(placement, part.center, center))
+                    world_box(&part.bvh.bounds, &Transforms::new(placement, part.rebase, rebase))
                 })
                 .collect();
             Bvh::over_boxes(&boxes, 1)
         });
-        Self { parts, upper, center, quality }
+        Self { parts, upper, rebase, quality, rounds_outward: true }
     }
 
     /// The features with what the trees themselves need.
@@ -111,6 +157,37 @@ impl Tree {
         lower + self.upper.as_ref().map_or(0, |upper| upper.depth)
     }
 
+    /// References of subtrees that together are the tree, each small enough that no walk through it is cut short. `None` where
+    /// instances share meshes: what is below an instance cannot be divided.
+    pub(super) fn in_parts(&self) -> Option<Vec<u32>> {
+        if self.upper.is_some() {
+            return None;
+        }
+        let bvh = &self.parts.first()?.bvh;
+        // A round each for the nodes and leaves, and, as each ray of a subgroup may be in another leaf, one for each triangle and ray.
+        let mut rounds = vec![0_u64; bvh.nodes.len()];
+        let of_child = |rounds: &[u64], child: Child| match child {
+            Child::Node(index) => rounds[index as usize],
+            Child::Leaf { count, .. } => 1 + u64::from(count) * LANES,
+        };
+        for index in (0..bvh.nodes.len()).rev() {
+            let children = bvh.nodes[index].children;
+            rounds[index] = 1 + of_child(&rounds, children[0]) + of_child(&rounds, children[1]);
+        }
+        let mut parts = Vec::new();
+        let mut open = vec![Child::Node(0)];
+        while let Some(child) = open.pop() {
+            match child {
+                Child::Node(index) if of_child(&rounds, child) > MOST_ROUNDS => {
+                    open.extend(bvh.nodes[index as usize].children);
+                }
+                Child::Leaf { count: 0, .. } => {}
+                _ => parts.push(reference(child, 0, 0)),
+            }
+        }
+        Some(parts)
+    }
+
     /// Counts for a report: the deepest path through both levels; the cost of the tree that rays enter first, with an instance
     /// counted as one triangle.
     pub fn report(&self) -> report::Tree {
@@ -126,17 +203,18 @@ impl Tree {
 
     /// The trees for rays that start in the scene or at `eye`.
     pub(super) fn for_device(&self, soup: &Soup, eye: DVec3) -> DeviceTree {
-        let eye = eye - self.center;
+        let eye = self.rebase.exact(eye);
         let mut device = DeviceTree {
             records: Vec::new(),
             grid: Grid { origin: Vec3::ZERO, scale: Vec3::ONE },
             order: Vec::with_capacity(self.size().triangles),
             instances: Vec::new(),
-            centers: soup.parts.iter().zip(&self.parts).map(|(range, part)| (range.start, part.center)).collect(),
+            rebases: soup.parts.iter().zip(&self.parts).map(|(range, part)| (range.start, part.rebase)).collect(),
         };
         let Some(upper) = &self.upper else {
             for part in &self.parts {
-                let quantised = quantise(&part.bvh, eye.abs().as_vec3(), |child| reference(child, 0, 0));
+                let quantised =
+                    quantise(&part.bvh, eye.abs().as_vec3(), self.rounds_outward, |child| reference(child, 0, 0));
                 (device.records, device.grid) = (quantised.records, quantised.grid);
                 device.order.clone_from(&part.bvh.order);
             }
@@ -150,12 +228,12 @@ impl Tree {
             Child::Node(index) => index,
             Child::Leaf { first, .. } => !(first << 4 | LEAF_IS_INSTANCE),
         };
-        let quantised = quantise(upper, eye.abs().as_vec3(), refer);
+        let quantised = quantise(upper, eye.abs().as_vec3(), self.rounds_outward, refer);
         (device.records, device.grid) = (quantised.records, quantised.grid);
         let transforms: Vec<Transforms> = soup
             .placements
             .par_iter()
-            .map(|placement| Transforms::new(placement, self.parts[placement.part].center, self.center))
+            .map(|placement| Transforms::new(placement, self.parts[placement.part].rebase, self.rebase))
             .collect();
         let starts = [upper.bounds.lo.as_dvec3(), upper.bounds.hi.as_dvec3(), eye];
         let mut reach = vec![DVec3::ZERO; self.parts.len()];
@@ -170,7 +248,7 @@ impl Tree {
             let first_node = (device.records.len() / 2) as u32;
             let first_primitive = device.order.len() as u32;
             let refer = |child| reference(child, first_node, first_primitive);
-            let quantised = quantise(&part.bvh, reach.as_vec3(), refer);
+            let quantised = quantise(&part.bvh, reach.as_vec3(), self.rounds_outward, refer);
             // A tree of one leaf has a node only so that a flat scene has a root.
             let root = match part.bvh.nodes[0].children {
                 [leaf @ Child::Leaf { .. }, Child::Leaf { count: 0, .. }] => refer(leaf),
@@ -189,12 +267,12 @@ impl Tree {
     }
 }
 
-/// The centre of the box around triangles.
-fn center_of(positions: &[[DVec3; 3]]) -> DVec3 {
+/// The box around triangles.
+fn bounds_of(positions: &[[DVec3; 3]]) -> (DVec3, DVec3) {
     let bounds = positions.iter().flatten().fold(None, |bounds: Option<(DVec3, DVec3)>, point| {
         Some(bounds.map_or((*point, *point), |(lo, hi)| (lo.min(*point), hi.max(*point))))
     });
-    bounds.map_or(DVec3::ZERO, |(lo, hi)| (lo + hi) / 2.0)
+    bounds.unwrap_or_default()
 }
 
 fn box_corners(lo: DVec3, hi: DVec3) -> [DVec3; 8] {
@@ -213,16 +291,15 @@ fn world_box(bounds: &Aabb, transforms: &Transforms) -> Aabb {
     Aabb { lo: (lo - error).as_vec3(), hi: (hi + error).as_vec3() }
 }
 
-/// Between the device's world, about its centre, and a part's space, about the part's.
+/// Between the device's world and its space for a part.
 struct Transforms {
     world_from_part: DMat4,
     part_from_world: DMat4,
 }
 
 impl Transforms {
-    fn new(placement: &Placement, part_center: DVec3, world_center: DVec3) -> Self {
-        let world_from_part =
-            DMat4::from_translation(-world_center) * placement.world_from_part * DMat4::from_translation(part_center);
+    fn new(placement: &Placement, part: Rebase, world: Rebase) -> Self {
+        let world_from_part = world.matrix() * placement.world_from_part * part.matrix().inverse();
         Self { world_from_part, part_from_world: world_from_part.inverse() }
     }
 

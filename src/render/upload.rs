@@ -1,6 +1,6 @@
 //! Scene → device buffers, in the layout of `shaders/shared/layout.glsl`.
 
-use super::tree::DeviceTree;
+use super::tree::{DeviceTree, Rebase};
 use super::Renderer;
 use crate::error::Result;
 use crate::layout::{
@@ -19,8 +19,8 @@ pub(super) struct Scene<'a> {
     pub soup: &'a Soup,
     pub view: &'a View,
     pub tree: &'a DeviceTree,
-    /// Origin of the device's world.
-    pub center: DVec3,
+    /// From world space to the device's.
+    pub rebase: Rebase,
 }
 
 impl Scene<'_> {
@@ -54,18 +54,19 @@ impl Scene<'_> {
                 let lights = if features.shadows { lights.as_slice() } else { &[] };
                 make("lights", bytemuck::cast_slice(lights), Usage::Fetch)
             }
+            binding::FILTER_STEPS => {
+                let steps = if features.filter { self.view.filter.steps() } else { Vec::new() };
+                let texels: Vec<[f32; 4]> = steps.iter().map(|[start, end]| [*start, *end, 0.0, 0.0]).collect();
+                make("filter steps", bytemuck::cast_slice(&texels), Usage::Fetch)
+            }
             _ => return None,
         })
-    }
-
-    /// A point in the device's world.
-    fn local(&self, point: DVec3) -> Vec3 {
-        (point - self.center).as_vec3()
     }
 
     /// Three texels a triangle in leaf order.
     fn triangles(&self) -> Vec<[[u32; 4]; 3]> {
         let soup = self.soup;
+        let precedence = scene::precedence(self.scene, soup);
         let triangle = |primitive: &u32| {
             let index = *primitive as usize;
             let flags = soup.flags[index];
@@ -74,10 +75,10 @@ impl Scene<'_> {
                 (flags.smooth, TRIANGLE_SMOOTH),
                 (flags.colored, TRIANGLE_COLORED),
             ];
-            let flags = bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
-            let extra = [*primitive, soup.materials[index], flags];
-            let center = self.tree.center_of(index);
-            let texel = |corner: usize| with_bits((soup.positions[index][corner] - center).as_vec3(), extra[corner]);
+            let flags: u32 = bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
+            let extra = [*primitive, soup.materials[index] | flags, precedence[index]];
+            let rebase = self.tree.rebase_of(index);
+            let texel = |corner: usize| with_bits(rebase.point(soup.positions[index][corner]), extra[corner]);
             [texel(0), texel(1), texel(2)]
         };
         self.tree.order.par_iter().map(triangle).collect()
@@ -93,14 +94,19 @@ impl Scene<'_> {
 
     fn frame(&self) -> layout::Frame {
         let view = self.view;
-        let (right, up) = view.camera.half_axes(f64::from(view.width) / f64::from(view.height));
+        let (mut right, mut up) = view.camera.half_axes(f64::from(view.width) / f64::from(view.height));
+        let is_orthographic = matches!(view.camera.projection, Projection::Orthographic { .. });
+        if is_orthographic {
+            right *= self.rebase.scale;
+            up *= self.rebase.scale;
+        }
         let (strata_x, strata_y) = view.strata();
         layout::Frame {
-            eye: self.local(view.camera.eye).into(),
+            eye: self.rebase.point(view.camera.eye).into(),
             forward: view.camera.forward.as_vec3().into(),
             right: right.as_vec3().into(),
             up: up.as_vec3().into(),
-            orthographic: u32::from(matches!(view.camera.projection, Projection::Orthographic { .. })),
+            orthographic: u32::from(is_orthographic),
             width: view.width,
             height: view.height,
             tiles_across: view.width.div_ceil(TILE),
@@ -112,6 +118,8 @@ impl Scene<'_> {
             background_alpha: view.background.alpha() as f32,
             grid_origin: self.tree.grid.origin.into(),
             grid_scale: self.tree.grid.scale.into(),
+            filter_zero: view.filter.zero().min(f64::from(FAR)) as f32,
+            filter_mean: view.filter.mean_weight() as f32,
         }
     }
 
@@ -125,12 +133,14 @@ impl Scene<'_> {
                 (LIGHT_SPOT, scale, -outer_cosine * scale)
             }
         };
+        // Irradiance falls with the square of lengths, which are scaled; parallel light does not fall.
+        let square = if light.kind == LightKind::Directional { 1.0 } else { self.rebase.scale * self.rebase.scale };
         layout::Light {
             kind,
-            position: self.local(light.position).into(),
+            position: self.rebase.point(light.position).into(),
             direction: light.direction.as_vec3().into(),
-            intensity: light.intensity.as_vec3().into(),
-            range: light.range.map_or(FAR, |range| range as f32),
+            intensity: (light.intensity * square).as_vec3().into(),
+            range: light.range.map_or(FAR, |range| (range * self.rebase.scale) as f32),
             spot_scale: spot_scale as f32,
             spot_offset: spot_offset as f32,
             unused: [0.0; 3],

@@ -1,6 +1,6 @@
 //! What a scene needs of the renderer.
 
-use super::{Material, Scene, Soup, View};
+use super::{Filter, Material, Sampler, Scene, Soup, View};
 use crate::layout::Features;
 use glam::DVec3;
 
@@ -25,9 +25,15 @@ pub fn of(scene: &Scene, soup: &Soup, view: &View) -> Features {
         shadows,
         reflections: mirror && view.max_depth > 0,
         multisampling: view.samples > 1,
+        sobol: view.samples > 1 && view.sampler == Sampler::Sobol,
+        independent: view.samples > 1 && view.sampler == Sampler::Independent,
+        filter: view.samples > 1 && view.filter != Filter::Box,
         // These are the renderer's to know.
         deep_tree: false,
         instances: false,
         retrace: false,
+        fixed_epsilon: false,
+        moller_trumbore: false,
+        plain_sums: false,
     }
 }

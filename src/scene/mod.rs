@@ -11,10 +11,13 @@
 mod background;
 mod builtin;
 mod camera;
+mod dice;
 pub mod features;
 pub mod gltf;
 mod light;
 mod material;
+mod precedence;
+mod sampling;
 pub mod shapes;
 mod soup;
 mod teapot;
@@ -25,6 +28,8 @@ pub use builtin::{built_in, BUILT_IN};
 pub use camera::{Camera, CameraChoice, Projection};
 pub use light::{Light, LightKind};
 pub use material::{Material, Whitted};
+pub use precedence::precedence;
+pub use sampling::{Filter, Sampler};
 pub use soup::{Instancing, Placement, Soup, TriangleFlags};
 pub use view::View;
 

@@ -3,6 +3,7 @@
 
 use super::{Instance, Mesh, Scene};
 use crate::error::{Error, Result};
+use crate::layout::MATERIAL_BITS;
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use std::ops::Range;
 
@@ -71,8 +72,11 @@ pub struct Soup {
 /// Most triangles: a leaf's reference has 27 bits for its first triangle.
 const MAX_TRIANGLES: usize = 1 << 27;
 
-/// Sizes between which the kernels' products of three lengths stay within f32.
-const SIZES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+/// Most materials: a triangle's word for it also holds flags.
+const MAX_MATERIALS: usize = 1 << MATERIAL_BITS;
+
+/// Sizes of scenes. The device gets them scaled; this is what the scene's own f32 positions and intensities can mean.
+const SIZES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
 /// Bytes that a triangle takes on the device: corners and its share of the tree; vertex normals or colours.
 const TRIANGLE_BYTES: usize = 48 + 16;
@@ -123,6 +127,10 @@ impl Soup {
                 .sum::<usize>();
         if count >= MAX_TRIANGLES {
             return Err(Error::content(&scene.name, format!("{count} triangles: at most {MAX_TRIANGLES}")));
+        }
+        if scene.materials.len() > MAX_MATERIALS {
+            let count = scene.materials.len();
+            return Err(Error::content(&scene.name, format!("{count} materials: at most {MAX_MATERIALS}")));
         }
         let mut soup = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, ..Self::default() };
         soup.positions.reserve(count);
@@ -245,6 +253,12 @@ impl Soup {
             });
         }
         Added { flattened: false, not_finite }
+    }
+
+    /// The first part holds what stands alone, in world space.
+    pub(super) fn has_own_part(&self) -> bool {
+        self.placements.first().is_some_and(|first| first.part == 0 && first.world_from_part == DMat4::IDENTITY)
+            && self.placements.iter().filter(|placement| placement.part == 0).count() == 1
     }
 
     /// Every triangle is there once, in world space.

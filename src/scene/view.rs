@@ -1,6 +1,6 @@
 //! A picture to be taken of a scene: camera, lights that shine, size, samples, depth, background.
 
-use super::{Background, Camera, Light, Scene};
+use super::{Background, Camera, Filter, Light, Sampler, Scene};
 use crate::error::{Error, Result};
 use std::f64::consts::PI;
 
@@ -30,6 +30,14 @@ pub struct View {
     pub max_depth: u32,
     /// What rays that hit nothing see.
     pub background: Background,
+    /// Where samples lie.
+    pub sampler: Sampler,
+    /// How they are weighed.
+    pub filter: Filter,
+    /// Chooses between samplers' sequences.
+    pub seed: u32,
+    /// The first of the samples in their sequence; not for stratified ones, which are a set.
+    pub first_sample: u32,
 }
 
 impl View {
@@ -52,7 +60,19 @@ impl View {
             return Err(Error::Usage(format!("maximum depth {max_depth}: must be 0 to {MAX_DEPTH}")));
         }
         let lights = scene.lights.iter().copied().filter(|light| !light.is_dark()).collect();
-        Ok(Self { camera, lights, width, height, samples, max_depth, background: Background::default() })
+        Ok(Self {
+            camera,
+            lights,
+            width,
+            height,
+            samples,
+            max_depth,
+            background: Background::default(),
+            sampler: Sampler::default(),
+            filter: Filter::default(),
+            seed: 0,
+            first_sample: 0,
+        })
     }
 
     /// Adds the default light if the file declares none: parallel light of π lux from above the camera's left shoulder, so

@@ -1,0 +1,36 @@
+//! Which of several surfaces at the very same distance is seen.
+
+use super::{Scene, Soup};
+use rayon::prelude::*;
+
+/// A number for each primitive of the soup; of several hits at the same distance the one with the smallest number is seen. It comes from what the triangle
+/// looks like, so that copies of a surface that several meshes share give the same picture in whatever order the file has them. Where
+/// the numbers are equal too, so are, but for a chance of 2⁻³², the looks.
+pub fn precedence(scene: &Scene, soup: &Soup) -> Vec<u32> {
+    let materials: Vec<u32> = scene
+        .materials
+        .iter()
+        .map(|material| format!("{material:?}").bytes().fold(0x811c_9dc5, |hash, byte| mix(hash, byte.into())))
+        .collect();
+    let vectors = |of: &[[glam::Vec3; 3]], primitive: usize, hash: u32| {
+        let corners = of.get(primitive).into_iter().flatten();
+        corners.flat_map(|corner| corner.to_array()).fold(hash, |hash, value| mix(hash, value.to_bits()))
+    };
+    let of_primitive = |primitive: usize| {
+        let flags = soup.flags[primitive];
+        let mut hash = materials[soup.materials[primitive] as usize];
+        if flags.smooth {
+            hash = vectors(&soup.normals, primitive, hash);
+        }
+        if flags.colored {
+            hash = vectors(&soup.colors, primitive, hash);
+        }
+        hash
+    };
+    (0..soup.len()).into_par_iter().map(of_primitive).collect()
+}
+
+/// One step of FNV-1a.
+fn mix(hash: u32, value: u32) -> u32 {
+    (hash ^ value).wrapping_mul(0x0100_0193)
+}
