@@ -33,6 +33,7 @@ pub mod reference;
 pub mod render;
 pub mod report;
 pub mod scene;
+pub mod stress;
 pub mod vulkan;
 
 pub use error::{Error, Result};

@@ -108,6 +108,8 @@ struct Frame {
     float filter_zero;
     /// The mean weight of a sample.
     float filter_mean;
+    /// How far off surfaces rays start where FIXED_EPSILON is on.
+    float fixed_epsilon;
 };
 
 /// What changes from dispatch to dispatch: push constants.

@@ -124,7 +124,7 @@ Surface surface_at(HitItem item) {
 
 /// How far off the surface a ray starts.
 float offset_of(Surface surface) {
-    return FIXED_EPSILON ? 1e-4 : surface.error;
+    return FIXED_EPSILON ? frame.fixed_epsilon : surface.error;
 }
 
 /// Start of a ray that leaves the surface: moved along the geometric normal, to the side the ray goes to, by the error

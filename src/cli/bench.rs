@@ -6,7 +6,7 @@ use super::{load_scene, milliseconds, Context, Outcome};
 use clap::{Args, ValueEnum, ValueHint};
 use glam::{DVec3, Vec3};
 use glimt::render::ray_sets::{BenchRay, BenchView, PrimaryHit, SetKind};
-use glimt::render::{describe_device, Met, Prepared, Renderer, Trace, Tracer};
+use glimt::render::{describe_device, Met, Prepared, Ray, Renderer, Trace, Tracer};
 use glimt::report::{Bench, BenchTree, Mismatches, Set, Spread};
 use glimt::scene::{Camera, Instancing, LightKind, Projection};
 use glimt::vulkan::DeviceChoice;
@@ -161,14 +161,14 @@ impl BenchArgs {
     ) -> Result<Vec<Set>> {
         let order = view.order();
         let by_pixel = view.primary();
-        let primary: Vec<BenchRay> = order.iter().map(|pixel| by_pixel[*pixel as usize]).collect();
+        let primary: Vec<Ray> = order.iter().map(|pixel| (&by_pixel[*pixel as usize]).into()).collect();
         let wanted = |kind: SetKind| self.sets.iter().any(|set| set.kind() == kind);
         let runs = |kind| if wanted(kind) { self.runs as usize } else { 0 };
         // The other sets start where the primary rays end.
         let trace = tracer.trace(SetKind::Primary, &primary, runs(SetKind::Primary), options)?;
         let mut hits = vec![None; by_pixel.len()];
         for (pixel, met) in order.iter().zip(&trace.met) {
-            if let Met::Triangle { t, primitive } = *met {
+            if let Met::Triangle { t, primitive, .. } = *met {
                 let corners = prepared.soup.positions[primitive as usize].map(|corner| corner.as_vec3());
                 hits[*pixel as usize] = Some(PrimaryHit { t, corners });
             }
@@ -189,7 +189,7 @@ impl BenchArgs {
             let traced = if kind == SetKind::Primary {
                 trace.clone()
             } else {
-                tracer.trace(kind, &active, runs(kind), options)?
+                tracer.trace(kind, &active.iter().map(Ray::from).collect::<Vec<_>>(), runs(kind), options)?
             };
             let answers: Vec<f32> = traced.met.iter().map(answer).collect();
             let mismatches = files.compare(kind, prepared, &pixels, &active, &answers)?;

@@ -9,6 +9,7 @@ mod info;
 mod machine;
 mod progress;
 mod render;
+mod stress;
 mod values;
 mod view;
 
@@ -59,6 +60,7 @@ Examples:
   cat model.glb | glimt render - -o - > out.png     from a pipe to a pipe
   glimt explain model.glb                           what is computed, what is left out, and why
   glimt bench model.glb --sets primary,shadow        how fast rays of a view are traced
+  glimt stress --quick                              which extreme cases hold on this device
   glimt diff a.png b.png --max-rmse 0.004           exit code 1 when they differ more
 
 Exit codes: 0 done · 1 a check said no · 2 bad usage or input · 3 no usable device, or it failed · 4 output not written ·
@@ -84,6 +86,8 @@ enum Command {
     Devices(devices::DevicesArgs),
     /// Measure how fast rays are traced and trees are built
     Bench(bench::BenchArgs),
+    /// Run extreme and stiff cases and say which hold: leaks, self-hits, needles, far away, bad transforms, …
+    Stress(stress::StressArgs),
     /// Compare two pictures: RMSE, PSNR, maximum difference, SSIM, FLIP
     Diff(diff::DiffArgs),
     /// Print a completion script for a shell
@@ -93,7 +97,7 @@ enum Command {
 impl Cli {
     /// The command writes a file, so that Ctrl-C must let it clean up.
     pub fn writes_files(&self) -> bool {
-        matches!(self.command, Command::Render(_) | Command::Diff(_) | Command::Bench(_))
+        matches!(self.command, Command::Render(_) | Command::Diff(_) | Command::Bench(_) | Command::Stress(_))
     }
 
     /// Runs the command.
@@ -107,6 +111,7 @@ impl Cli {
             Command::Explain(args) => args.run(),
             Command::Devices(args) => args.run(),
             Command::Bench(args) => args.run(context),
+            Command::Stress(args) => args.run(context),
             Command::Diff(args) => args.run(context),
             Command::Completions(args) => args.run(),
         }

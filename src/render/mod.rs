@@ -10,7 +10,7 @@ mod upload;
 
 pub use options::{Options, Progress, Sabotage};
 pub use plan::{LeftOut, Plan, PlannedBuffer, PlannedPass};
-pub use trace::{Met, Trace, Tracer};
+pub use trace::{Met, Ray, Trace, Tracer};
 pub use tree::{Rebase, Tree, TreeSize};
 
 use crate::error::{Error, Result};

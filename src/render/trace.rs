@@ -24,6 +24,24 @@ pub struct Tracer<'a> {
     order: Vec<u32>,
 }
 
+/// A ray in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Start.
+    pub origin: DVec3,
+    /// Unit direction.
+    pub direction: DVec3,
+    /// Hits beyond this do not count.
+    pub t_max: f64,
+}
+
+impl From<&BenchRay> for Ray {
+    fn from(ray: &BenchRay) -> Self {
+        let [origin, direction] = [ray.origin, ray.direction].map(|vector| DVec3::from(Vec3::from(vector)));
+        Self { origin, direction, t_max: ray.t_max.into() }
+    }
+}
+
 /// What a ray met.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Met {
@@ -37,6 +55,8 @@ pub enum Met {
         t: f32,
         /// Its number in the soup.
         primitive: u32,
+        /// λ2, λ3.
+        barycentrics: [f32; 2],
     },
 }
 
@@ -81,7 +101,7 @@ impl Tracer<'_> {
     ///
     /// # Errors
     /// `Device` when the rays do not fit or one is lost; `Vulkan` when the device fails.
-    pub fn trace(&mut self, kind: SetKind, rays: &[BenchRay], runs: usize, options: &Options) -> Result<Trace> {
+    pub fn trace(&mut self, kind: SetKind, rays: &[Ray], runs: usize, options: &Options) -> Result<Trace> {
         let input = Input::new(self.frame.renderer, kind, rays, self.rebase)?;
         if rays.len() > (self.prepared.view.width * self.prepared.view.height) as usize {
             return Err(Error::Device(format!("{} rays do not fit into the queue", rays.len())));
@@ -162,7 +182,7 @@ impl Tracer<'_> {
     }
 
     /// Reads what the last run left behind.
-    fn answers(&self, kind: SetKind, rays: &[BenchRay]) -> Result<Vec<Met>> {
+    fn answers(&self, kind: SetKind, rays: &[Ray]) -> Result<Vec<Met>> {
         let read_back = |slot| upload::read_back(self.frame.renderer, self.frame.buffer(slot));
         let mut met = vec![Met::Nothing; rays.len()];
         if kind == SetKind::Shadow {
@@ -184,10 +204,8 @@ impl Tracer<'_> {
             let corners = self.prepared.soup.positions[primitive as usize];
             let [l2, l3] = item.barycentrics.map(f64::from);
             let point = corners[0] * (1.0 - l2 - l3) + corners[1] * l2 + corners[2] * l3;
-            let offset = point - DVec3::from(Vec3::from(ray.origin));
-            let direction = DVec3::from(Vec3::from(ray.direction));
-            let t = (offset.dot(direction) / direction.length_squared()) as f32;
-            met[item.sample_index as usize] = Met::Triangle { t, primitive };
+            let t = ((point - ray.origin).dot(ray.direction) / ray.direction.length_squared()) as f32;
+            met[item.sample_index as usize] = Met::Triangle { t, primitive, barycentrics: item.barycentrics };
         }
         Ok(met)
     }
@@ -204,12 +222,12 @@ struct Input {
 }
 
 impl Input {
-    fn new(renderer: &Renderer, kind: SetKind, rays: &[BenchRay], rebase: Rebase) -> Result<Self> {
-        let item = |(ray, sample_index): (&BenchRay, u32)| RayItem {
-            origin: rebase.point(DVec3::from(Vec3::from(ray.origin))).into(),
+    fn new(renderer: &Renderer, kind: SetKind, rays: &[Ray], rebase: Rebase) -> Result<Self> {
+        let item = |(ray, sample_index): (&Ray, u32)| RayItem {
+            origin: rebase.point(ray.origin).into(),
             sample_index,
-            direction: ray.direction,
-            distance: (f64::from(ray.t_max) * rebase.scale).min(f64::from(FAR)) as f32,
+            direction: ray.direction.as_vec3().into(),
+            distance: (ray.t_max * rebase.scale).min(f64::from(FAR)) as f32,
         };
         let queue = match kind {
             SetKind::Primary => None,

@@ -120,6 +120,7 @@ impl Scene<'_> {
             grid_scale: self.tree.grid.scale.into(),
             filter_zero: view.filter.zero().min(f64::from(FAR)) as f32,
             filter_mean: view.filter.mean_weight() as f32,
+            fixed_epsilon: (1e-4 * self.rebase.scale) as f32,
         }
     }
 

@@ -1,8 +1,10 @@
 //! What a render did: counts, times, bytes; as one JSON object for machines and as text for people.
 
 mod bench;
+mod stress;
 
 pub use bench::{Bench, BenchTree, Mismatches, Set, Spread};
+pub use stress::StressRow;
 
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -1,0 +1,161 @@
+//! Cases judged ray by ray: leaks, needles.
+
+use super::scenes::{grey, noisy_sphere, scene_of, tilt, torus, Random};
+use super::{Finding, Stress};
+use crate::error::Result;
+use crate::render::ray_sets::SetKind;
+use crate::render::{Met, Options, Prepared, Ray};
+use crate::scene::{shapes, CameraChoice, Mesh, Scene};
+use glam::{DMat4, DVec3};
+
+/// Rays that are traced at once: a picture of so many pixels.
+const AT_ONCE: (u32, u32) = (512, 768);
+const QUICK_AT_ONCE: (u32, u32) = (256, 256);
+
+impl Stress<'_> {
+    fn rays_at_once(&self) -> (u32, u32) {
+        if self.quick {
+            QUICK_AT_ONCE
+        } else {
+            AT_ONCE
+        }
+    }
+
+    /// The nearest hits of rays that `make` finds in the scene's triangles as the device will have them, seen from `eye`.
+    fn nearest(
+        &self,
+        scene: &Scene,
+        eye: DVec3,
+        toward: DVec3,
+        make: impl FnOnce(&Prepared, usize) -> Vec<Ray>,
+    ) -> Result<(Prepared, Vec<Ray>, Vec<Met>)> {
+        let size = self.rays_at_once();
+        let camera = CameraChoice::LookAt { eye, target: Some(toward) };
+        let options = Options { size, camera, ..self.options.clone() };
+        let prepared = Prepared::new(scene, &options)?;
+        let rays = make(&prepared, (size.0 * size.1) as usize);
+        let tree = prepared.tree(&options);
+        let trace = self.renderer.tracer(scene, &prepared, &tree)?.trace(SetKind::Diffuse, &rays, 1, &options)?;
+        Ok((prepared, rays, trace.met))
+    }
+}
+
+/// Points inside a mesh in its own space, from which every ray must hit it.
+type Inside = fn(&mut Random) -> DVec3;
+
+/// Closed meshes.
+pub(super) fn leaks(stress: &mut Stress) -> Result<()> {
+    let in_ring: Inside = |random| {
+        let angle = random.unit() * std::f64::consts::TAU;
+        DVec3::new(angle.cos(), 0.0, angle.sin()) + random.in_cube() * 0.15
+    };
+    let meshes: [(&str, Mesh, Inside); 3] = [
+        ("sphere", noisy_sphere(32), |random| random.in_cube() * 0.15),
+        ("torus", torus(48, 24), in_ring),
+        ("box", shapes::cube(), |random| random.in_cube() * 0.45),
+    ];
+    let scales = stress.few(&[1e-6, 1e-3, 1.0, 1e3, 1e6], &[1e-6, 1.0, 1e6]);
+    let offsets = stress.few(&[1e1, 1e3, 1e5, 1e7], &[1e3, 1e7]);
+    for (name, mesh, inside) in meshes {
+        let settings = scales.iter().map(|scale| ("scale", *scale, *scale, 0.0));
+        let settings = settings.chain(offsets.iter().map(|offset| ("offset", *offset, 1.0, *offset)));
+        for (what, value, scale, offset) in settings.collect::<Vec<_>>() {
+            stress.row(&format!("{name}, {what}"), value, |stress| leak(stress, &mesh, inside, scale, offset))?;
+        }
+    }
+    Ok(())
+}
+
+fn leak(stress: &Stress, mesh: &Mesh, inside: Inside, scale: f64, offset: f64) -> Result<Finding> {
+    let transform = DMat4::from_translation(DVec3::splat(offset * scale)) * DMat4::from_scale(DVec3::splat(scale));
+    let scene = scene_of([(mesh.clone(), transform, grey(1.0, 0.0, 0.0))], Vec::new());
+    let mut random = Random::new(11);
+    let eye = transform.transform_point3(inside(&mut random));
+    let make = |prepared: &Prepared, count: usize| {
+        let triangles = &prepared.soup.positions;
+        let ray = |index: usize| {
+            let origin = transform.transform_point3(inside(&mut random));
+            let [a, b, _] = triangles[random.below(triangles.len())];
+            let direction = match index % 4 {
+                0 => a - origin,
+                1 => (a + b) * 0.5 - origin,
+                _ => random.direction(),
+            };
+            Ray { origin, direction: direction.normalize(), t_max: f64::MAX }
+        };
+        (0..count).map(ray).collect()
+    };
+    let (_, rays, met) = stress.nearest(&scene, eye, eye + DVec3::Z * scale, make)?;
+    let missed = met.iter().filter(|met| **met == Met::Nothing).count();
+    Ok(Finding::none_of(rays.len() as u64, missed as u64))
+}
+
+/// Slivers on either side of the middle of the square.
+const SLIVERS: i32 = 32;
+
+/// A square whose middle is cut into slivers; their ends lie on its border.
+fn sliced_square(width: f64) -> Mesh {
+    let mut mesh = Mesh { name: "slivers".into(), ..Mesh::default() };
+    let places = [-0.5].into_iter().chain((-SLIVERS..=SLIVERS).map(|i| f64::from(i) * width)).chain([0.5]);
+    for x in places {
+        mesh.positions.extend([-0.5, 0.5].map(|y| DVec3::new(x, y, 0.0).as_vec3()));
+    }
+    for column in 0..mesh.positions.len() as u32 / 2 - 1 {
+        let [a, b, c, d] = [0, 2, 3, 1].map(|corner| 2 * column + corner);
+        mesh.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+    mesh
+}
+
+/// Rounding error of a point's coordinates on a triangle, of their size: 16 · 2⁻²⁴.
+const POINT_ERROR: f64 = 9.6e-7;
+
+/// Slivers.
+pub(super) fn needles(stress: &mut Stress) -> Result<()> {
+    let aspects = stress.few(&[1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8], &[1e2, 1e4, 1e6, 1e8]);
+    for (name, transform) in [("tilted", tilt()), ("along axes", DMat4::IDENTITY)] {
+        for aspect in &aspects {
+            stress.row(&format!("aspect, {name}"), *aspect, |stress| needle(stress, *aspect, transform))?;
+        }
+    }
+    Ok(())
+}
+
+/// Rays that miss, or hit further from where they should than the sliver's shape lets f32 know.
+fn needle(stress: &Stress, aspect: f64, transform: DMat4) -> Result<Finding> {
+    let width = 1.0 / aspect.max(2.1 * f64::from(SLIVERS));
+    let scene = scene_of([(sliced_square(width), transform, grey(1.0, 0.0, 0.0))], Vec::new());
+    let eye = transform.transform_point3(DVec3::new(0.3, 0.2, 1.0));
+    let mut random = Random::new(13);
+    let make = |_: &Prepared, count: usize| {
+        let ray = |index: usize| {
+            let origin = transform.transform_point3(DVec3::Z * 0.7 + random.in_cube() * 0.3);
+            let within = 0.98 * (random.unit() - 0.5);
+            let target = match index % 4 {
+                0 => DVec3::new(f64::from(random.below(2 * SLIVERS as usize) as i32 - SLIVERS) * width, within, 0.0),
+                1 => DVec3::new((random.unit() * 2.0 - 1.0) * f64::from(SLIVERS) * width, within, 0.0),
+                _ => DVec3::new(0.98 * (random.unit() - 0.5), within, 0.0),
+            };
+            let target = transform.transform_point3(target);
+            Ray { origin, direction: (target - origin).normalize(), t_max: f64::MAX }
+        };
+        (0..count).map(ray).collect()
+    };
+    let (prepared, rays, met) = stress.nearest(&scene, eye, transform.transform_point3(DVec3::ZERO), make)?;
+    let is_wrong = |(ray, met): (&Ray, &Met)| {
+        let Met::Triangle { primitive, barycentrics, .. } = *met else { return true };
+        let corners = prepared.soup.positions[primitive as usize];
+        let [l2, l3] = barycentrics.map(f64::from);
+        let point = corners[0] * (1.0 - l2 - l3) + corners[1] * l2 + corners[2] * l3;
+        let beside = (point - ray.origin).reject_from(ray.direction).length();
+        // A coordinate's error moves the point along the sliver as many times as it is longer than wide, at most to its end.
+        let edges = [corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]];
+        let longest = edges.iter().map(|edge| edge.length()).fold(0.0, f64::max);
+        let height = edges[0].cross(edges[1]).length() / longest;
+        let bound = (POINT_ERROR * (1.0 + longest / height.max(f64::MIN_POSITIVE))).min(longest) + POINT_ERROR;
+        // Negated, so that a point that is no number is wrong.
+        !(beside <= bound)
+    };
+    let wrong = rays.iter().zip(&met).filter(|pair| is_wrong(*pair)).count();
+    Ok(Finding::none_of(rays.len() as u64, wrong as u64))
+}
