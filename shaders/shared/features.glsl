@@ -19,7 +19,7 @@ layout(constant_id = 6) const bool MULTISAMPLING = true;
 layout(constant_id = 7) const bool DEEP_TREE = true;
 /// Instances share meshes: an upper tree over instances, whose leaves are trees over the triangles of a mesh.
 layout(constant_id = 8) const bool INSTANCES = true;
-/// The kernel traces again what overflowed, with a stack as deep as any tree: a variant, not a need of the scene.
+/// The kernel traces again what overflowed or was uncertain, with a stack as deep as any tree and exact products: a variant, not a need of the scene.
 layout(constant_id = 9) const bool RETRACE = true;
 /// Sample positions are those of a scrambled Sobol sequence instead of stratified ones.
 layout(constant_id = 10) const bool SOBOL = true;

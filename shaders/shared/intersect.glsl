@@ -1,7 +1,11 @@
 // Ray against triangle, watertight: Woop, Benthin and Wald, JCGT 2(1) 2013. The world is sheared so that the ray runs
 // along z from the origin; then three 2D edge functions decide. Two triangles evaluate a shared edge by the same products,
 // exactly negated (`precise` forbids contraction), and 0 counts as inside: no ray slips between them. Rounding is monotone, so the
-// difference of two rounded products never has the wrong sign: it is 0 where f32 cannot tell, and then both triangles are hit.
+// difference of two rounded products never has the wrong sign: it is 0 where f32 cannot tell, and then both triangles are hit. On slivers
+// so thin that little is left of the products there is nothing sensible to divide by; rays that meet one are traced again with exact products.
+
+/// What is left of the products of edge functions, as a share, below which barycentric coordinates have fewer than six bits.
+const float LITTLE_LEFT = 7.6e-6;
 
 /// The triangle of a ray that hits none.
 const uint NO_TRIANGLE = 0xffffffffu;
@@ -22,7 +26,8 @@ struct Hit {
     vec2 barycentrics;
     /// Instance; decides before the primitive.
     uint instance;
-    /// What the triangle looks like, as a number: decides before both, so that the order of the file never shows.
+    /// Whether its back is hit, then what it looks like, as a number: decides before both, so that the order of the file never shows, and
+    /// of a thing as thin as paper the side that faces the ray is seen.
     uint precedence;
 };
 
@@ -63,8 +68,36 @@ void moller_trumbore(Ray ray, vec3 a, vec3 b, vec3 c, out vec3 uvw, out float de
 }
 #endif
 
-/// Takes the triangle as the new hit if it is nearer than the old one.
-bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool culls, inout Hit hit) {
+/// What rounding took from a product: a·b = fl(a·b) + rest, exactly (Dekker, Numer. Math. 18, 1971). Not by fma, which
+/// software Vulkan does not fuse.
+float product_rest(float a, float b, float product) {
+    precise float scaled_a = a * 4097.0;
+    precise float scaled_b = b * 4097.0;
+    precise float high_a = scaled_a - (scaled_a - a);
+    precise float high_b = scaled_b - (scaled_b - b);
+    precise float low_a = a - high_a;
+    precise float low_b = b - high_b;
+    precise float rest = ((high_a * high_b - product) + high_a * low_b + low_a * high_b) + low_a * low_b;
+    return rest;
+}
+
+/// Twice the area of the triangle from the origin to p and q: with RETRACE to the last digits, otherwise 0 where its sign is not certain. Adds to
+/// `size` how large it might have been.
+float edge_function(vec2 p, vec2 q, inout float size) {
+    precise float first = p.x * q.y;
+    precise float second = p.y * q.x;
+    precise float area = first - second;
+    size += abs(first);
+    if (RETRACE) {
+        precise float rest = product_rest(p.x, q.y, first) - product_rest(p.y, q.x, second);
+        precise float exact = area + rest;
+        return exact;
+    }
+    return area;
+}
+
+/// Takes the triangle as the new hit if it is nearer than the old one. A ray for which that cannot be decided is `uncertain`.
+bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool culls, inout Hit hit, inout bool uncertain) {
     uint first = triangle * TRIANGLE_TEXELS;
     uvec4 texel_a = FETCH(triangles, first);
     uvec4 texel_b = FETCH(triangles, first + 1u);
@@ -76,9 +109,10 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool culls
     precise vec2 pa = a.xy - ray.shear.xy * a.z;
     precise vec2 pb = b.xy - ray.shear.xy * b.z;
     precise vec2 pc = c.xy - ray.shear.xy * c.z;
-    precise float u = pc.x * pb.y - pc.y * pb.x;
-    precise float v = pa.x * pc.y - pa.y * pc.x;
-    precise float w = pb.x * pa.y - pb.y * pa.x;
+    float size = 0.0;
+    float u = edge_function(pc, pb, size);
+    float v = edge_function(pa, pc, size);
+    float w = edge_function(pb, pa, size);
     bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
 
     float det = u + v + w;
@@ -95,12 +129,15 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool culls
     }
 #endif
     // det and 1/z have the same sign when the ray meets the front face.
-    bool culled = culls && (texel_b.w & TRIANGLE_SINGLE_SIDED) != 0u && (det < 0.0) != (ray.shear.z < 0.0);
+    uncertain = uncertain || (!RETRACE && inside && abs(det) <= size * LITTLE_LEFT);
+    bool is_back = (det < 0.0) != (ray.shear.z < 0.0);
+    bool culled = culls && (texel_b.w & TRIANGLE_SINGLE_SIDED) != 0u && is_back;
     bool comes_first = INSTANCES && instance != hit.instance ? instance < hit.instance : texel_a.w < hit.primitive;
-    bool is_first = texel_c.w != hit.precedence ? texel_c.w < hit.precedence : comes_first;
+    uint precedence = texel_c.w | (is_back ? PRECEDENCE_BACK : 0u);
+    bool is_first = precedence != hit.precedence ? precedence < hit.precedence : comes_first;
     bool nearer = t < hit.t || (t == hit.t && is_first);
     if (inside && det != 0.0 && t > 0.0 && nearer && !culled) {
-        hit = Hit(t, triangle, texel_a.w, vec2(v, w) / det, instance, texel_c.w);
+        hit = Hit(t, triangle, texel_a.w, vec2(v, w) / det, instance, precedence);
         return true;
     }
     return false;

@@ -27,6 +27,8 @@ const uint INSTANCE_TEXELS = 8u;
 /// Texels in a HitItem or a RayItem.
 const uint ITEM_TEXELS = 2u;
 
+/// Added to the precedence of a triangle whose back is hit; its own is below.
+const uint PRECEDENCE_BACK = 0x80000000u;
 /// Bits of a triangle's material word below its flags.
 const uint MATERIAL_BITS = 29u;
 /// Triangle flag: only the front face (counter-clockwise) is seen by camera and reflection rays.
@@ -42,7 +44,7 @@ const uint QUEUE_HIT = 0u;
 const uint QUEUE_SHADOW = 1u;
 /// Queue of reflected rays that wait to be traced.
 const uint QUEUE_REFLECTION = 2u;
-/// Queue of rays whose walk overflowed its stack and is to be done again with a larger one.
+/// Queue of rays whose walk is to be done again: it overflowed its stack, or could not tell whether it hits.
 const uint QUEUE_RETRACE = 3u;
 /// Number of queues.
 const uint QUEUES = 4u;
@@ -70,7 +72,8 @@ const uint LIGHT_DIRECTIONAL = 2u;
 /// Distance that stands for infinity, in world units.
 const float FAR = 1e30;
 
-/// What is constant during a frame. World space is the scene's, moved to the eye and scaled to size 1.
+/// What is constant during a frame. World space is the scene's, moved to the eye, scaled to size 1 and, for a very
+/// narrow view, turned along with the camera.
 struct Frame {
     /// Camera position (perspective) or centre of its plane (orthographic).
     vec3 eye;
@@ -80,6 +83,8 @@ struct Frame {
     vec3 right;
     /// Camera up, as long as half the picture is high (at distance 1 for perspective).
     vec3 up;
+    /// The direction from nadir to zenith.
+    vec3 sky;
     /// 1: parallel rays, 0: rays through the eye.
     uint orthographic;
     /// Picture width in pixels.

@@ -26,5 +26,5 @@ LightSample light_at(Light light, vec3 position) {
 }
 
 vec3 background(vec3 direction) {
-    return frame.nadir + (frame.zenith - frame.nadir) * (0.5 + 0.5 * direction.y);
+    return frame.nadir + (frame.zenith - frame.nadir) * (0.5 + 0.5 * dot(direction, frame.sky));
 }

@@ -13,6 +13,9 @@ struct Surface {
     uint material;
     /// From position to where shadow rays start: on the curved surface that the vertex normals stand for.
     vec3 bulge;
+    /// From position towards the middle of the triangle, four times as far as the error: what rounding put beyond an edge, and so behind the
+    /// wall that meets this one there, is inside again.
+    vec3 inward;
 };
 
 vec3 interpolate(vec3 weights, uvec4 a, uvec4 b, uvec4 c) {
@@ -90,6 +93,9 @@ Surface surface_at(HitItem item) {
     float size_c = max(abs(edge_c.x), max(abs(edge_c.y), abs(edge_c.z)));
     vec3 across = cross(edge_b / size_b, edge_c / size_c);
     surface.geometric_normal = normalize(is_placed ? world_normal(item.instance, across) : across);
+    vec3 to_middle = (a + b + c) / 3.0 - (weights.x * a + weights.y * b + weights.z * c);
+    to_middle = is_placed ? world_from_part(item.instance) * to_middle : to_middle;
+    surface.inward = to_middle * min(4.0 * surface.error / max(length(to_middle), 1e-30), 0.01);
     surface.normal = surface.geometric_normal;
     surface.bulge = vec3(0.0);
     if (SMOOTH_NORMALS && (flags & TRIANGLE_SMOOTH) != 0u) {
@@ -131,11 +137,11 @@ float offset_of(Surface surface) {
 /// bound, which grows with the triangle and its distance from the world's origin.
 vec3 leave_surface(Surface surface, vec3 direction) {
     float side = dot(surface.geometric_normal, direction) < 0.0 ? -1.0 : 1.0;
-    return surface.position + surface.geometric_normal * (side * offset_of(surface));
+    return surface.position + surface.inward + surface.geometric_normal * (side * offset_of(surface));
 }
 
 /// Start of a shadow ray: from the curved surface that the vertex normals stand for (Hanika, Ray Tracing Gems II, ch. 4), so that the
 /// flat triangles do not show where light only just reaches it; on the side that is seen.
 vec3 leave_towards_light(Surface surface) {
-    return surface.position + surface.bulge + surface.geometric_normal * offset_of(surface);
+    return surface.position + surface.inward + surface.bulge + surface.geometric_normal * offset_of(surface);
 }

@@ -2,7 +2,7 @@
 // nearer child first. The stack is a shift register: ten variables that move up and down, touched with constant indices
 // only, because an indexed array costs software Vulkan eight scalar branches a push. When a live entry falls off its end,
 // the ray goes to the retrace queue, where a variant of the same kernel walks again with an array as deep as the tree can be:
-// rare, and no ray is ever lost. The same happens to a walk that the driver cut short; if that is still too long, it is done again
+// rare, and no ray is ever lost. The same happens to a ray that f32 cannot tell whether it hits, and to a walk that the driver cut short; if that is still too long, it is done again
 // subtree by subtree.
 
 /// No node: the stack is empty.
@@ -67,10 +67,11 @@ struct Walk {
     ShearedRay ray;
     uint instance;
     bool cut;
+    bool uncertain;
 };
 
 Walk begin_walk(Ray world_ray) {
-    return Walk(grid_ray(world_ray, frame.grid_origin, frame.grid_scale), shear_ray(world_ray), 0u, false);
+    return Walk(grid_ray(world_ray, frame.grid_origin, frame.grid_scale), shear_ray(world_ray), 0u, false, false);
 }
 
 /// A leaf of the upper tree: ~(instance · 16 + LEAF_IS_INSTANCE).
@@ -106,7 +107,8 @@ bool visit_leaf(inout Walk walk, int leaf, bool any, inout Hit hit) {
     uint end = triangle + (reference & 15u);
     bool found = false;
     while (triangle < end && triangle != uint(IMPOSSIBLE)) {
-        found = intersect_triangle(walk.ray, triangle, walk.instance, SINGLE_SIDED && !any, hit) || found;
+        found = intersect_triangle(walk.ray, triangle, walk.instance, SINGLE_SIDED && !any, hit,
+                                   walk.uncertain) || found;
         triangle++;
     }
     walk.cut = walk.cut || triangle < end;
@@ -174,7 +176,7 @@ void pop(inout Stack stack) {
     stack.entries[REGISTERS - 1] = NOTHING;
 }
 
-/// The walk with registers for a stack; false if it overflowed or was cut short and is worth nothing.
+/// The walk with registers for a stack; false if it is worth nothing: the stack overflowed, the walk was cut short, or a triangle left it uncertain.
 bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
     Walk walk = begin_walk(world_ray);
     Stack stack;
@@ -209,9 +211,10 @@ bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
         if (any && found) {
             node = NOTHING;
             stack.overflow = 0;
+            walk.uncertain = false;
         }
     }
-    return is_complete(node, walk.cut) && stack.overflow == 0;
+    return is_complete(node, walk.cut) && stack.overflow == 0 && !walk.uncertain;
 }
 
 /// Finds the nearest hit, or with `any` some hit, closer than hit.t; a miss leaves hit as it was. False: the ray must be traced
@@ -238,7 +241,7 @@ Hit hit_so_far(uint index, float distance) {
         if (triangle != NO_TRIANGLE)
             hit = Hit(uintBitsToFloat(first.x), triangle, FETCH(triangles, triangle * TRIANGLE_TEXELS).w,
                       uintBitsToFloat(first.zw), partial_hits[2u * index + 1u].x,
-                      FETCH(triangles, triangle * TRIANGLE_TEXELS + 2u).w);
+                      partial_hits[2u * index + 1u].y);
     }
     return hit;
 }
@@ -248,7 +251,7 @@ bool is_last_part(uint index, Hit hit) {
     if (!RETRACE)
         return true;
     partial_hits[2u * index] = uvec4(floatBitsToUint(hit.t), hit.triangle, floatBitsToUint(hit.barycentrics));
-    partial_hits[2u * index + 1u] = uvec4(hit.instance);
+    partial_hits[2u * index + 1u] = uvec4(hit.instance, hit.precedence, 0u, 0u);
     // A condition of the whole dispatch, made one of this thread: see kernel.glsl.
     return all(bvec2(step_now.last_part != 0u, index != NO_ITEM));
 }

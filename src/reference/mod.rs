@@ -70,6 +70,7 @@ struct Ray {
 struct Hit {
     t: f64,
     primitive: usize,
+    front: bool,
     /// λ2, λ3.
     barycentrics: (f64, f64),
 }
@@ -133,16 +134,19 @@ impl Tracer<'_> {
         (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some((u, v, t, determinant > 0.0))
     }
 
-    /// The nearest hit of all triangles; of several at the same distance the one that takes precedence, then the first in the soup.
+    /// The nearest hit of all triangles; of several at the same distance a front before a back, then the one that takes precedence, then the first in the soup.
     fn nearest(&self, ray: &Ray) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
         for primitive in 0..self.soup.len() {
             let Some((u, v, t, front)) = self.intersect(ray, primitive) else { continue };
             let seen = front || !self.soup.flags[primitive].single_sided;
-            let before =
-                |hit: &Hit| t < hit.t || (t == hit.t && self.precedence[primitive] < self.precedence[hit.primitive]);
+            let before = |hit: &Hit| {
+                t < hit.t
+                    || (t == hit.t
+                        && (!front, self.precedence[primitive]) < (!hit.front, self.precedence[hit.primitive]))
+            };
             if seen && nearest.as_ref().is_none_or(before) {
-                nearest = Some(Hit { t, primitive, barycentrics: (u, v) });
+                nearest = Some(Hit { t, primitive, front, barycentrics: (u, v) });
             }
         }
         nearest
@@ -187,7 +191,7 @@ impl Tracer<'_> {
         let material = &self.scene.materials[self.soup.materials[primitive] as usize];
         let whitted = material.whitted(tint);
         // Far above f64's rounding, far below whatever can be seen.
-        let off = 1e-10 * hit.t + 1e-13 * self.scale;
+        let off = 1e-10 * hit.t + 2e-15 * self.scale;
         let leave = |direction: DVec3| {
             let side = if plane_normal.dot(direction) < 0.0 { -1.0 } else { 1.0 };
             Ray { origin: point + plane_normal * (side * off), direction }

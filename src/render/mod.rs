@@ -88,11 +88,7 @@ impl Prepared {
     pub fn tree(&self, options: &Options) -> Tree {
         let Self { soup, view, .. } = self;
         let sabotage = |one| options.sabotage == Some(one);
-        let rebase = if sabotage(Sabotage::NoRebase) {
-            Rebase { origin: glam::DVec3::ZERO, scale: 1.0 }
-        } else {
-            Rebase::new(soup.lo, soup.hi, view.camera.eye)
-        };
+        let rebase = if sabotage(Sabotage::NoRebase) { Rebase::NONE } else { Rebase::for_view(soup.lo, soup.hi, view) };
         let mut tree = Tree::build(soup, rebase, options.quality(soup.len()));
         tree.rounds_outward = !sabotage(Sabotage::TightBoxes);
         tree

@@ -163,7 +163,7 @@ impl Plan {
         buffer("hit_queue", queue(true, size_of::<HitItem>()), true);
         buffer("shadow_queue", queue(features.shadows, size_of::<RayItem>()), true);
         buffer("reflection_queue", queue(features.reflections, size_of::<RayItem>()), true);
-        buffer("retrace_queue", queue(features.deep_tree, size_of::<u32>()), true);
+        buffer("retrace_queue", queue(true, size_of::<u32>()), true);
         buffer("counters", (4 * u64::from(crate::layout::COUNTERS)).next_multiple_of(PIXEL), false);
         buffer("dispatches", 12 * u64::from(crate::layout::QUEUES), false);
         buffer("shadow_radiance", queue(features.shadows, PIXEL as usize), true);
@@ -192,7 +192,7 @@ impl Plan {
         leave(features.vertex_colors, &["colors"], "no mesh has vertex colours");
         leave(features.single_sided, &["back-face culling"], "all materials are double-sided");
         leave(features.instances, &["instances"], "no mesh is shared, or that would save little");
-        leave(features.deep_tree, &["retrace_queue"], "the tree is no deeper than the stack");
+        leave(features.deep_tree, &["watch over the stack"], "the tree is no deeper than the stack");
         leave(features.multisampling, &["sample positions", "film_rest"], "one sample a pixel goes through its centre");
         let even = if features.multisampling {
             "the pixel's area counts evenly"

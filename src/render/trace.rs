@@ -226,7 +226,7 @@ impl Input {
         let item = |(ray, sample_index): (&Ray, u32)| RayItem {
             origin: rebase.point(ray.origin).into(),
             sample_index,
-            direction: ray.direction.as_vec3().into(),
+            direction: rebase.direction(ray.direction).into(),
             distance: (ray.t_max * rebase.scale).min(f64::from(FAR)) as f32,
         };
         let queue = match kind {

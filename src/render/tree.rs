@@ -7,7 +7,7 @@
 use crate::bvh::{quantise, reference, Aabb, Bvh, Child, Grid, Quality};
 use crate::layout::{Features, Instance, LEAF_IS_INSTANCE, STACK_REGISTERS};
 use crate::report;
-use crate::scene::{Placement, Soup};
+use crate::scene::{Placement, Projection, Soup, View};
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -44,7 +44,13 @@ pub struct Rebase {
     pub origin: DVec3,
     /// Device lengths a length of the scene.
     pub scale: f64,
+    /// How it is turned.
+    pub rotation: DMat3,
 }
+
+/// Angle of a pixel, in radians, below which the world is turned along with the camera: f32 knows a direction to 6e-8 only, unless it lies along
+/// an axis.
+const NARROW: f64 = 1.5e-5;
 
 impl Rebase {
     /// For what lies between two corners and is seen from `eye`: the eye itself becomes the origin, or what is nearest to it, so that
@@ -52,7 +58,33 @@ impl Rebase {
     pub fn new(lo: DVec3, hi: DVec3, eye: DVec3) -> Self {
         let size = (hi - lo).max_element();
         let exponent = if size > 0.0 && size.is_finite() { size.log2().floor() } else { 0.0 };
-        Self { origin: eye.clamp(lo, hi), scale: (-exponent).exp2() }
+        Self { origin: eye.clamp(lo, hi), scale: (-exponent).exp2(), rotation: DMat3::IDENTITY }
+    }
+
+    /// For a scene in this box as a view sees it.
+    pub fn for_view(lo: DVec3, hi: DVec3, view: &View) -> Self {
+        let camera = &view.camera;
+        let rebase = Self::new(lo, hi, camera.eye);
+        match camera.projection {
+            Projection::Perspective { fov } if 2.0 * (fov / 2.0).tan() < NARROW * f64::from(view.height) => {
+                let rotation = DMat3::from_cols(camera.right, camera.up, -camera.forward).transpose();
+                Self { rotation, ..rebase }
+            }
+            _ => rebase,
+        }
+    }
+
+    /// The world as it is.
+    pub const NONE: Self = Self { origin: DVec3::ZERO, scale: 1.0, rotation: DMat3::IDENTITY };
+
+    /// A direction; its length stays.
+    pub fn direction(&self, direction: DVec3) -> Vec3 {
+        (self.rotation * direction).as_vec3()
+    }
+
+    /// Whether directions change.
+    pub fn turns(&self) -> bool {
+        self.rotation != DMat3::IDENTITY
     }
 
     /// A point.
@@ -62,12 +94,12 @@ impl Rebase {
 
     /// A point, not yet rounded.
     fn exact(&self, point: DVec3) -> DVec3 {
-        (point - self.origin) * self.scale
+        self.rotation * ((point - self.origin) * self.scale)
     }
 
     /// As a matrix.
     fn matrix(&self) -> DMat4 {
-        DMat4::from_scale(DVec3::splat(self.scale)) * DMat4::from_translation(-self.origin)
+        DMat4::from_mat3(self.rotation * self.scale) * DMat4::from_translation(-self.origin)
     }
 }
 

@@ -31,7 +31,7 @@ impl Scene<'_> {
             binding::NODES => make("nodes", bytemuck::cast_slice(&self.tree.records), Usage::Fetch),
             binding::TRIANGLES => make("triangles", bytemuck::cast_slice(&self.triangles()), Usage::Fetch),
             binding::NORMALS => {
-                let normals = if features.smooth_normals { self.per_primitive(&self.soup.normals) } else { Vec::new() };
+                let normals = if features.smooth_normals { self.normals() } else { Vec::new() };
                 make("normals", bytemuck::cast_slice(&normals), Usage::Fetch)
             }
             binding::COLORS => {
@@ -92,6 +92,16 @@ impl Scene<'_> {
         vectors.par_iter().map(|corners| corners.map(|corner| with_bits(corner, 0))).collect()
     }
 
+    /// Vertex normals, turned as the world is where they stand in it.
+    fn normals(&self) -> Vec<[[u32; 4]; 3]> {
+        let mut normals = std::borrow::Cow::Borrowed(&self.soup.normals);
+        if self.rebase.turns() && self.soup.is_flat() {
+            let turn = |normal: Vec3| self.rebase.direction(normal.as_dvec3());
+            normals.to_mut().par_iter_mut().for_each(|corners| *corners = corners.map(turn));
+        }
+        self.per_primitive(&normals)
+    }
+
     fn frame(&self) -> layout::Frame {
         let view = self.view;
         let (mut right, mut up) = view.camera.half_axes(f64::from(view.width) / f64::from(view.height));
@@ -103,9 +113,10 @@ impl Scene<'_> {
         let (strata_x, strata_y) = view.strata();
         layout::Frame {
             eye: self.rebase.point(view.camera.eye).into(),
-            forward: view.camera.forward.as_vec3().into(),
-            right: right.as_vec3().into(),
-            up: up.as_vec3().into(),
+            forward: self.rebase.direction(view.camera.forward).into(),
+            right: self.rebase.direction(right).into(),
+            up: self.rebase.direction(up).into(),
+            sky: self.rebase.direction(DVec3::Y).into(),
             orthographic: u32::from(is_orthographic),
             width: view.width,
             height: view.height,
@@ -139,7 +150,7 @@ impl Scene<'_> {
         layout::Light {
             kind,
             position: self.rebase.point(light.position).into(),
-            direction: light.direction.as_vec3().into(),
+            direction: self.rebase.direction(light.direction).into(),
             intensity: (light.intensity * square).as_vec3().into(),
             range: light.range.map_or(FAR, |range| (range * self.rebase.scale) as f32),
             spot_scale: spot_scale as f32,

@@ -4,8 +4,8 @@ use super::{Scene, Soup};
 use rayon::prelude::*;
 
 /// A number for each primitive of the soup; of several hits at the same distance the one with the smallest number is seen. It comes from what the triangle
-/// looks like, so that copies of a surface that several meshes share give the same picture in whatever order the file has them. Where
-/// the numbers are equal too, so are, but for a chance of 2⁻³², the looks.
+/// looks like and has 31 bits, so that copies of a surface that several meshes share give the same picture in whatever order the file has them. Where
+/// the numbers are equal too, so are, but for a chance of 2⁻³¹, the looks.
 pub fn precedence(scene: &Scene, soup: &Soup) -> Vec<u32> {
     let materials: Vec<u32> = scene
         .materials
@@ -27,7 +27,7 @@ pub fn precedence(scene: &Scene, soup: &Soup) -> Vec<u32> {
         }
         hash
     };
-    (0..soup.len()).into_par_iter().map(of_primitive).collect()
+    (0..soup.len()).into_par_iter().map(|primitive| of_primitive(primitive) >> 1).collect()
 }
 
 /// One step of FNV-1a.
