@@ -83,7 +83,9 @@ impl Renderer {
         tree: &'a super::Tree,
     ) -> Result<Tracer<'a>> {
         let View { width, height, .. } = prepared.view;
-        let features = tree.features(Features { shadows: true, reflections: true, ..Features::default() });
+        let moller_trumbore = prepared.features.moller_trumbore;
+        let features = Features { shadows: true, reflections: true, moller_trumbore, ..Features::default() };
+        let features = tree.features(features);
         let plan = Plan::new(scene, &prepared.soup, &prepared.view, features, tree.size(), width * height);
         if plan.waves(1) != 1 {
             return Err(Error::Usage(format!("{width}x{height} rays do not fit into one wave")));

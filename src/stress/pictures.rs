@@ -193,7 +193,7 @@ pub(super) fn transforms(stress: &mut Stress) -> Result<()> {
 
 /// A ball, smooth or flat, and a cube under one matrix, and a light that does not move.
 fn transformed(matrix: DMat4, smooth: bool) -> Scene {
-    let cube = matrix * DMat4::from_translation(DVec3::X * 1.6) * DMat4::from_scale(DVec3::splat(0.8));
+    let cube = matrix * DMat4::from_translation(DVec3::X * 2.4) * DMat4::from_scale(DVec3::splat(0.8));
     // An odd number of rings: with vertices on the equator a flattened ball's two sides have different normals at one place.
     let mut ball = shapes::sphere(13);
     if !smooth {
