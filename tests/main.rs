@@ -6,6 +6,7 @@
 //! * `scene` — shapes, transforms, cameras, materials
 //! * `gltf` — accessors of every kind, hierarchies, faults, written by the tests themselves
 //! * `frames` — pictures: against the reference, closed forms, determinism, features
+//! * `stress` — extreme cases hold, and fail without their safeguards
 //! * `cli` — the program: exit codes, messages, files
 //! * `corpus` — real and broken files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
 
@@ -19,4 +20,5 @@ mod frames;
 mod gltf;
 mod layout;
 mod scene;
+mod stress;
 mod support;

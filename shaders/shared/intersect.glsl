@@ -81,18 +81,21 @@ float product_rest(float a, float b, float product) {
     return rest;
 }
 
-/// Twice the area of the triangle from the origin to p and q: with RETRACE to the last digits, otherwise 0 where its sign is not certain. Adds to
-/// `size` how large it might have been.
+/// Twice the area of the triangle from the origin to p and q; 0 where its sign is not certain. Adds to `size` how large it might
+/// have been.
 float edge_function(vec2 p, vec2 q, inout float size) {
     precise float first = p.x * q.y;
     precise float second = p.y * q.x;
     precise float area = first - second;
     size += abs(first);
-    if (RETRACE) {
-        precise float rest = product_rest(p.x, q.y, first) - product_rest(p.y, q.x, second);
-        precise float exact = area + rest;
-        return exact;
-    }
+    return area;
+}
+
+/// The same to the last digits.
+float exact_edge_function(vec2 p, vec2 q) {
+    precise float first = p.x * q.y;
+    precise float second = p.y * q.x;
+    precise float area = (first - second) + (product_rest(p.x, q.y, first) - product_rest(p.y, q.x, second));
     return area;
 }
 
@@ -114,8 +117,17 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool culls
     float v = edge_function(pa, pc, size);
     float w = edge_function(pb, pa, size);
     bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
-
     float det = u + v + w;
+    bool is_uncertain = inside && abs(det) <= size * LITTLE_LEFT;
+    if (RETRACE && is_uncertain) {
+        u = exact_edge_function(pc, pb);
+        v = exact_edge_function(pa, pc);
+        w = exact_edge_function(pb, pa);
+        inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
+        det = u + v + w;
+    }
+    uncertain = uncertain || is_uncertain;
+
     precise float t = (u * a.z + v * b.z + w * c.z) * ray.shear.z / det;
 #ifndef PLAIN
     if (MOLLER_TRUMBORE) {
@@ -129,7 +141,6 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool culls
     }
 #endif
     // det and 1/z have the same sign when the ray meets the front face.
-    uncertain = uncertain || (!RETRACE && inside && abs(det) <= size * LITTLE_LEFT);
     bool is_back = (det < 0.0) != (ray.shear.z < 0.0);
     bool culled = culls && (texel_b.w & TRIANGLE_SINGLE_SIDED) != 0u && is_back;
     bool comes_first = INSTANCES && instance != hit.instance ? instance < hit.instance : texel_a.w < hit.primitive;

@@ -144,6 +144,12 @@ fn stop_if_interrupted(options: &Options) -> Result<()> {
     }
 }
 
+/// What was typed, for pages that say how they were made.
+fn command_line() -> String {
+    let arguments = std::env::args().skip(1);
+    std::iter::once("glimt".into()).chain(arguments).collect::<Vec<_>>().join(" ")
+}
+
 fn milliseconds(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }

@@ -1,10 +1,10 @@
 //! `glimt stress`.
 
 use super::machine::MachineArgs;
-use super::{Context, Outcome};
+use super::{command_line, Context, Outcome};
 use clap::{Args, ValueEnum, ValueHint};
 use glimt::render::{describe_device, Renderer, Sabotage};
-use glimt::report::StressRow;
+use glimt::report::{stress_page, StressRow};
 use glimt::stress::{run, Case, CASES};
 use glimt::vulkan::DeviceChoice;
 use glimt::{Error, Options, Result};
@@ -96,6 +96,11 @@ impl StressArgs {
         }
         let device = describe_device(renderer.device());
         let failed = rows.iter().filter(|row| !row.holds).count();
+        if let Some(path) = &self.html {
+            let about = CASES.map(|case| (case.name, case.about));
+            let subject = format!("{} ({}), {}", device.name, device.driver, command_line());
+            glimt::film::write_whole(path, stress_page(&rows, &about, &subject).as_bytes())?;
+        }
         let mut outcome = if self.json { Outcome::json(&rows)? } else { Outcome::default() };
         if !self.json {
             let lines = rows.iter().map(|row| row.text() + "\n").collect::<String>();

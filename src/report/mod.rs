@@ -1,10 +1,12 @@
 //! What a render did: counts, times, bytes; as one JSON object for machines and as text for people.
 
 mod bench;
+pub mod page;
+pub mod plot;
 mod stress;
 
 pub use bench::{Bench, BenchTree, Mismatches, Set, Spread};
-pub use stress::StressRow;
+pub use stress::{stress_page, StressRow};
 
 use serde::Serialize;
 use std::collections::BTreeMap;

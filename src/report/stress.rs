@@ -1,5 +1,7 @@
 //! What the extreme cases gave.
 
+use super::page::Page;
+use super::plot::{log_log, Series};
 use serde::{Serialize, Serializer};
 
 /// One value of a case's parameter.
@@ -47,4 +49,75 @@ impl StressRow {
             self.case, self.parameter, self.value, self.rays, self.wrong, self.error, self.bound, self.ms
         )
     }
+}
+
+/// The page of a run: a plot of each parameter of each case, with all rows. `about` is one line for each case.
+pub fn stress_page(rows: &[StressRow], about: &[(&str, &str)], subject: &str) -> String {
+    let mut page = Page::new("Extreme and stiff cases");
+    page.about(subject);
+    let failed = rows.iter().filter(|row| !row.holds).count();
+    page.text(&format!(
+        "{} of {} values hold. Each case is a scene made by code, swept over a parameter and judged by f64 arithmetic or a closed form. Left: \
+         the share of rays or pixels that are wrong, or the relative error; what is exactly 0 lies on the lower edge, and the most that is \
+         allowed is drawn beside it where it is not 0. Right: run time with making the scene and judging it.",
+        rows.len() - failed,
+        rows.len()
+    ));
+    for (case, about) in about {
+        let rows: Vec<&StressRow> = rows.iter().filter(|row| row.case == *case).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        page.heading(case);
+        page.text(about);
+        let mut parameters: Vec<&str> = rows.iter().map(|row| row.parameter.as_str()).collect();
+        parameters.dedup();
+        parameters.sort_unstable();
+        parameters.dedup();
+        let swept = |parameter: &&&str| {
+            let values = rows.iter().filter(|row| row.parameter == ***parameter).map(|row| row.value);
+            values.clone().count() > 1 && values.clone().all(|value| value > 0.0 && value.is_finite())
+        };
+        let series = |figure: fn(&StressRow) -> f64, suffix: &str| -> Vec<Series> {
+            let of_parameter = |parameter: &&str| Series {
+                name: format!("{parameter}{suffix}"),
+                points: rows
+                    .iter()
+                    .filter(|row| row.parameter == **parameter)
+                    .map(|row| (row.value, if figure(row).is_finite() { figure(row) } else { 1.0 }))
+                    .collect(),
+                is_line: true,
+            };
+            parameters.iter().filter(swept).map(of_parameter).collect()
+        };
+        let mut errors = series(|row| row.error, "");
+        if !errors.is_empty() {
+            if rows.iter().all(|row| row.bound == rows[0].bound) && rows[0].bound > 0.0 {
+                let ends = errors.iter().flat_map(|series| series.points.iter().map(|point| point.0));
+                let (lo, hi) = ends.fold((f64::INFINITY, 0.0_f64), |(lo, hi), x| (lo.min(x), hi.max(x)));
+                let points = vec![(lo, rows[0].bound), (hi, rows[0].bound)];
+                errors.push(Series { name: "most that is allowed".into(), points, is_line: true });
+            }
+            page.row(&[
+                log_log("value of the parameter", "error", &errors),
+                log_log("value of the parameter", "run time, ms", &series(|row| row.ms, "")),
+            ]);
+        }
+        let cells = |row: &&StressRow| {
+            let cells = vec![
+                row.parameter.clone(),
+                format!("{:e}", row.value),
+                row.rays.to_string(),
+                row.wrong.to_string(),
+                if row.error.is_finite() { format!("{:.2e}", row.error) } else { "-".into() },
+                format!("{:.2e}", row.bound),
+                format!("{:.1}", row.ms),
+                if row.holds { "yes".into() } else { format!("NO {}", row.note) },
+            ];
+            (cells, !row.holds)
+        };
+        let headings = ["parameter", "value", "rays", "wrong", "error", "most allowed", "ms", "holds"];
+        page.table(&headings, &rows.iter().map(cells).collect::<Vec<_>>());
+    }
+    page.html()
 }

@@ -48,7 +48,7 @@ pub(super) fn hall_of_mirrors(stress: &mut Stress) -> Result<()> {
             let exact = ADDED * (1.0 - s.powi(depth as i32 + 1)) / (1.0 - s);
             let error = worst(&film, exact);
             let rays = film.pixels.len() as u64 * u64::from(depth + 1);
-            Ok(Finding { rays, wrong: u64::from(!(error <= FIVE_DIGITS)), error, bound: FIVE_DIGITS })
+            Ok(Finding::figure(rays, error, FIVE_DIGITS))
         })?;
     }
     Ok(())
@@ -63,8 +63,8 @@ pub(super) fn truncation(stress: &mut Stress) -> Result<()> {
             let expected = s.powi(depth as i32 + 1);
             let rays = film.pixels.len() as u64 * u64::from(depth + 1);
             let bound = expected + FIVE_DIGITS;
-            let holds = missing <= bound && missing >= expected - FIVE_DIGITS;
-            Ok(Finding { rays, wrong: u64::from(!holds), error: if holds { missing } else { f64::INFINITY }, bound })
+            let is_less = missing < expected - FIVE_DIGITS;
+            Ok(Finding::figure(rays, if is_less { f64::INFINITY } else { missing }, bound))
         })?;
     }
     Ok(())
@@ -76,12 +76,12 @@ pub(super) fn radiance(stress: &mut Stress) -> Result<()> {
         let strength = 10_f64.powi(power);
         stress.row("parallel light, lux", strength, |stress| {
             let light = Light::directional(DVec3::new(0.0, -1.0, 0.0), DVec3::splat(strength));
-            under(stress, light, |_| 0.5 * strength)
+            under(stress, light, 0.5 * strength)
         })?;
         stress.row("point light, candela", strength, |stress| {
             // So far away that it is the same everywhere in the picture.
             let light = Light::point(DVec3::Y * 1e4, DVec3::splat(strength));
-            under(stress, light, |_| 0.5 * strength / 1e8)
+            under(stress, light, 0.5 * strength / 1e8)
         })?;
     }
     for samples in stress.few(&[1, 10, 100, 1_000, 10_000, 100_000, 1_000_000], &[100, 1_000_000]) {
@@ -101,11 +101,10 @@ fn from_above(stress: &Stress) -> Options {
     Options { size: (16, 12), camera, background, ..stress.options.clone() }
 }
 
-fn under(stress: &Stress, light: Light, expected: impl Fn(()) -> f64) -> Result<Finding> {
+fn under(stress: &Stress, light: Light, expected: f64) -> Result<Finding> {
     let (film, report) = stress.renderer.render(&square(0.0, vec![light]), &from_above(stress))?;
-    let error = worst(&film, expected(()));
-    let wrong = u64::from(!(error <= FIVE_DIGITS));
-    Ok(Finding { rays: report.rays.primary + report.rays.shadow, wrong, error, bound: FIVE_DIGITS })
+    let error = worst(&film, expected);
+    Ok(Finding::figure(report.rays.primary + report.rays.shadow, error, FIVE_DIGITS))
 }
 
 /// One pixel of one colour: its mean is that colour however many samples there are.
@@ -114,6 +113,5 @@ fn many_samples(stress: &Stress, samples: u32) -> Result<Finding> {
     let options = Options { size: (1, 1), samples, samples_in_flight: 1 << 20, ..from_above(stress) };
     let (film, report) = stress.renderer.render(&square(ambient, Vec::new()), &options)?;
     let error = worst(&film, ambient);
-    let wrong = u64::from(!(error <= FIVE_DIGITS));
-    Ok(Finding { rays: report.rays.primary, wrong, error, bound: FIVE_DIGITS })
+    Ok(Finding::figure(report.rays.primary, error, FIVE_DIGITS))
 }

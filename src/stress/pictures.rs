@@ -1,7 +1,7 @@
 //! Cases judged by whole pictures, beside the f64 reference or each other.
 
 use super::scenes::{elsewhere, grey, scene_of, tilt};
-use super::{Finding, Stress};
+use super::{exceeds, Finding, Stress};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::reference;
@@ -78,7 +78,7 @@ fn outward(stress: &Stress, scale: f64, offset: f64, angle: f64) -> Result<Findi
     let film = stress.draw(&elsewhere(&scene, scale, offset), &options)?;
     // The normal is known to some 1e-7, which is much of a small angle.
     let tolerance = 1e-3 + 4e-7 / angle;
-    let wrong = film.pixels.iter().filter(|pixel| !((f64::from(pixel[0]) - 1.0).abs() <= tolerance)).count();
+    let wrong = film.pixels.iter().filter(|pixel| exceeds((f64::from(pixel[0]) - 1.0).abs(), tolerance)).count();
     Ok(Finding::none_of(film.pixels.len() as u64, wrong as u64))
 }
 
@@ -96,7 +96,7 @@ fn inward(stress: &Stress, scale: f64, offset: f64, angle: f64) -> Result<Findin
     let background = Background::Constant(DVec3::ONE);
     let options = Options { fov: Some((4.0 * angle).min(1.0)), max_depth: BOUNCES, background, ..options };
     let film = stress.draw(&elsewhere(&scene, scale, offset), &options)?;
-    let wrong = film.pixels.iter().filter(|pixel| !(pixel[0] == 0.0)).count();
+    let wrong = film.pixels.iter().filter(|pixel| pixel[0] != 0.0).count();
     Ok(Finding::none_of(film.pixels.len() as u64 * u64::from(BOUNCES + 1), wrong as u64))
 }
 

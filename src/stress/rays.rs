@@ -1,7 +1,7 @@
 //! Cases judged ray by ray: leaks, needles.
 
 use super::scenes::{grey, noisy_sphere, scene_of, tilt, torus, Random};
-use super::{Finding, Stress};
+use super::{exceeds, Finding, Stress};
 use crate::error::Result;
 use crate::render::ray_sets::SetKind;
 use crate::render::{Met, Options, Prepared, Ray};
@@ -153,8 +153,7 @@ fn needle(stress: &Stress, aspect: f64, transform: DMat4) -> Result<Finding> {
         let longest = edges.iter().map(|edge| edge.length()).fold(0.0, f64::max);
         let height = edges[0].cross(edges[1]).length() / longest;
         let bound = (POINT_ERROR * (1.0 + longest / height.max(f64::MIN_POSITIVE))).min(longest) + POINT_ERROR;
-        // Negated, so that a point that is no number is wrong.
-        !(beside <= bound)
+        exceeds(beside, bound)
     };
     let wrong = rays.iter().zip(&met).filter(|pair| is_wrong(*pair)).count();
     Ok(Finding::none_of(rays.len() as u64, wrong as u64))

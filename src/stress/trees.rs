@@ -44,7 +44,8 @@ const JUDGED: (u32, u32) = (24, 16);
 
 /// Meshes that make bad trees.
 pub(super) fn trees_that_hurt(stress: &mut Stress) -> Result<()> {
-    let mut kinds: Vec<(&str, usize, fn(usize) -> Mesh)> = vec![
+    type Kind = (&'static str, usize, fn(usize) -> Mesh);
+    let mut kinds: Vec<Kind> = vec![
         ("triangles about one centre", 10_000, concentric),
         ("boxes, each twice as large", 40, doubling),
         ("triangles beside one 10⁴ × longer", 10_000, one_diagonal),
@@ -121,8 +122,8 @@ fn few(different: usize, copies: usize) -> Mesh {
     mesh
 }
 
-fn soup(count: usize, mut triangle: impl FnMut(usize) -> [DVec3; 3]) -> Mesh {
-    let positions: Vec<Vec3> = (0..count).flat_map(|index| triangle(index)).map(|corner| corner.as_vec3()).collect();
+fn soup(count: usize, triangle: impl FnMut(usize) -> [DVec3; 3]) -> Mesh {
+    let positions: Vec<Vec3> = (0..count).flat_map(triangle).map(|corner| corner.as_vec3()).collect();
     let triangles = (0..count as u32).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
     Mesh { name: "soup".into(), positions, triangles, ..Mesh::default() }
 }
