@@ -2,12 +2,16 @@
 
 use super::support::renderer;
 use glimt::render::Sabotage;
-use glimt::stress::{run, Case, CASES};
+use glimt::stress::{run, Case, Settings, CASES};
 use glimt::Options;
+
+fn quick() -> Settings {
+    Settings { quick: true, export: None }
+}
 
 #[test]
 fn every_case_holds() {
-    let rows = run(renderer(), &CASES, true, &Options::default(), &mut |row| println!("{}", row.text())).unwrap();
+    let rows = run(renderer(), &CASES, &quick(), &Options::default(), &mut |row| println!("{}", row.text())).unwrap();
     let failed: Vec<String> = rows.iter().filter(|row| !row.holds).map(|row| row.text()).collect();
     assert!(failed.is_empty(), "{failed:#?}");
     assert!(CASES.iter().all(|case| rows.iter().any(|row| row.case == case.name)), "a case has no row");
@@ -25,7 +29,7 @@ fn without_its_safeguard_a_case_fails() {
     for (name, sabotage) in pairs {
         let cases: Vec<Case> = CASES.into_iter().filter(|case| case.name == name).collect();
         let options = Options { sabotage: Some(sabotage), ..Options::default() };
-        let rows = run(renderer(), &cases, true, &options, &mut |_| ()).unwrap();
+        let rows = run(renderer(), &cases, &quick(), &options, &mut |_| ()).unwrap();
         let wrong: u64 = rows.iter().filter(|row| !row.holds).map(|row| row.wrong).sum();
         println!("{name} without its safeguard ({sabotage:?}): {wrong} wrong");
         assert!(wrong > 0, "{name} holds with {sabotage:?}");

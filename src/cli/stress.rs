@@ -5,7 +5,7 @@ use super::{command_line, Context, Outcome};
 use clap::{Args, ValueEnum, ValueHint};
 use glimt::render::{describe_device, Renderer, Sabotage};
 use glimt::report::{stress_page, StressRow};
-use glimt::stress::{run, Case, CASES};
+use glimt::stress::{run, Case, Settings, CASES};
 use glimt::vulkan::DeviceChoice;
 use glimt::{Error, Options, Result};
 use std::io::{IsTerminal, Write};
@@ -26,6 +26,9 @@ pub struct StressArgs {
     /// Write a page with a plot of each case
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     html: Option<PathBuf>,
+    /// Write the rays of cases that trace them one by one, and the triangles they meet, for other programs
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    export: Option<PathBuf>,
     /// List the cases
     #[arg(long)]
     list: bool,
@@ -80,6 +83,10 @@ impl StressArgs {
             sabotage: self.sabotage.map(Into::into),
             ..Options::default()
         };
+        if let Some(folder) = &self.export {
+            std::fs::create_dir_all(folder).map_err(|error| Error::write(folder, error))?;
+        }
+        let settings = Settings { quick: self.quick, export: self.export.clone() };
         let renderer = Renderer::new(&device, self.machine.validate)?;
         let cases: Vec<Case> =
             CASES.into_iter().filter(|case| self.cases.is_empty() || self.cases.contains(&case.name)).collect();
@@ -90,7 +97,7 @@ impl StressArgs {
                 let _ = writeln!(std::io::stderr(), "{}", row.text());
             }
         };
-        let rows = run(&renderer, &cases, self.quick, &options, &mut show)?;
+        let rows = run(&renderer, &cases, &settings, &options, &mut show)?;
         if self.machine.validate && !renderer.device().instance.messages().is_empty() {
             return Err(Error::Validation(renderer.device().instance.messages()));
         }

@@ -55,11 +55,13 @@ pub fn log_log(x_label: &str, y_label: &str, series: &[Series]) -> String {
     let ys = || series.iter().flat_map(|series| series.points.iter().map(|point| point.1));
     let (x, (low, high)) = (decades(xs()), decades(ys()));
     // Room for what is 0.
-    let y = (if ys().any(|y| y <= 0.0) { low / 10.0 } else { low }, high);
+    let has_zero = ys().any(|y| y <= 0.0);
+    let y = (if has_zero { low / 10.0 } else { low }, if series.len() > 3 { high * 10.0 } else { high });
     let mut svg = String::new();
     let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
     // Writing into a string cannot fail.
-    let _ = draw(&root, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), (x_label, y_label), series, (x.0, y.0));
+    let _ =
+        draw(&root, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), (x_label, y_label), series, (x.0, y.0), has_zero);
     drop(root);
     svg
 }
@@ -73,6 +75,7 @@ fn draw<X, Y>(
     labels: (&str, &str),
     series: &[Series],
     least: (f64, f64),
+    has_zero: bool,
 ) -> Result<(), Box<dyn std::error::Error>>
 where
     X: AsRangedCoord<Value = f64>,
@@ -89,7 +92,7 @@ where
         .x_labels(8)
         .y_labels(8)
         .x_label_formatter(&label)
-        .y_label_formatter(&label)
+        .y_label_formatter(&|value| if has_zero && *value < least.1 * 1.5 { "0".into() } else { label(value) })
         .light_line_style(RGBColor(240, 240, 240))
         .bold_line_style(RGBColor(215, 215, 215))
         .label_style(("sans-serif", 13))

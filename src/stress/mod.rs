@@ -12,6 +12,7 @@ mod trees;
 use crate::error::{Error, Result};
 use crate::render::{Options, Renderer};
 use crate::report::StressRow as Row;
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// A kind of scene that breaks renderers.
@@ -98,11 +99,20 @@ pub const CASES: [Case; 13] = [
 pub struct Stress<'a> {
     renderer: &'a Renderer,
     options: Options,
-    /// Fewer values and rays.
-    quick: bool,
+    settings: &'a Settings,
     case: &'static str,
     on_row: &'a mut dyn FnMut(&Row),
     rows: Vec<Row>,
+}
+
+/// How much is run, and what is left behind.
+#[derive(Clone, Debug, Default)]
+pub struct Settings {
+    /// Fewer values and rays.
+    pub quick: bool,
+    /// Folder for the rays of cases that trace rays one by one, in the device's space, with the triangles they meet: `NAME.bin` (a u32 count,
+    /// then nine f32 a triangle) and `NAME.rays` (eight f32 each: origin, 0, direction, farthest distance).
+    pub export: Option<PathBuf>,
 }
 
 /// What a value of the parameter gave.
@@ -147,11 +157,11 @@ fn exceeds(value: f64, bound: f64) -> bool {
 pub fn run(
     renderer: &Renderer,
     cases: &[Case],
-    quick: bool,
+    settings: &Settings,
     options: &Options,
     on_row: &mut dyn FnMut(&Row),
 ) -> Result<Vec<Row>> {
-    let mut stress = Stress { renderer, options: options.clone(), quick, case: "", on_row, rows: Vec::new() };
+    let mut stress = Stress { renderer, options: options.clone(), settings, case: "", on_row, rows: Vec::new() };
     for case in cases {
         stress.case = case.name;
         (case.run)(&mut stress)?;
@@ -162,7 +172,7 @@ pub fn run(
 impl Stress<'_> {
     /// Fewer of something where it must be quick.
     fn few<T: Clone>(&self, all: &[T], quick: &[T]) -> Vec<T> {
-        if self.quick { quick } else { all }.to_vec()
+        if self.settings.quick { quick } else { all }.to_vec()
     }
 
     /// Judges one value of a parameter and writes its row. A device that cannot compute it does not hold.

@@ -1,5 +1,6 @@
 //! Cases judged by whole pictures, beside the f64 reference or each other.
 
+use super::rays::leaving_faces;
 use super::scenes::{elsewhere, grey, scene_of, tilt};
 use super::{exceeds, Finding, Stress};
 use crate::error::{Error, Result};
@@ -61,7 +62,7 @@ pub(super) fn self_hit(stress: &mut Stress) -> Result<()> {
         stress.row("outward, grazing angle", angle, |stress| outward(stress, 1.0, 0.0, angle))?;
         stress.row("inward, grazing angle", angle, |stress| inward(stress, 1.0, 0.0, angle))?;
     }
-    Ok(())
+    leaving_faces(stress)
 }
 
 /// A cube's face under light that grazes it: every pixel of it is lit.

@@ -3,10 +3,12 @@
 use super::scenes::{grey, noisy_sphere, scene_of, tilt, torus, Random};
 use super::{exceeds, Finding, Stress};
 use crate::error::Result;
+use crate::film;
 use crate::render::ray_sets::SetKind;
-use crate::render::{Met, Options, Prepared, Ray};
+use crate::render::{Met, Options, Prepared, Ray, Tree};
 use crate::scene::{shapes, CameraChoice, Mesh, Scene};
 use glam::{DMat4, DVec3};
+use std::path::Path;
 
 /// Rays that are traced at once: a picture of so many pixels.
 const AT_ONCE: (u32, u32) = (512, 768);
@@ -14,16 +16,17 @@ const QUICK_AT_ONCE: (u32, u32) = (256, 256);
 
 impl Stress<'_> {
     fn rays_at_once(&self) -> (u32, u32) {
-        if self.quick {
+        if self.settings.quick {
             QUICK_AT_ONCE
         } else {
             AT_ONCE
         }
     }
 
-    /// The nearest hits of rays that `make` finds in the scene's triangles as the device will have them, seen from `eye`.
+    /// The nearest hits of rays that `make` finds in the scene's triangles, seen from `eye`; with Settings::export under `name`.
     fn nearest(
         &self,
+        name: &str,
         scene: &Scene,
         eye: DVec3,
         toward: DVec3,
@@ -35,9 +38,29 @@ impl Stress<'_> {
         let prepared = Prepared::new(scene, &options)?;
         let rays = make(&prepared, (size.0 * size.1) as usize);
         let tree = prepared.tree(&options);
+        if let Some(folder) = &self.settings.export {
+            export(folder, &format!("{}-{name}", self.case).replace(' ', "-"), &prepared, &tree, &rays)?;
+        }
         let trace = self.renderer.tracer(scene, &prepared, &tree)?.trace(SetKind::Diffuse, &rays, 1, &options)?;
         Ok((prepared, rays, trace.met))
     }
+}
+
+/// Writes triangles and rays as the device has them.
+fn export(folder: &Path, name: &str, prepared: &Prepared, tree: &Tree, rays: &[Ray]) -> Result<()> {
+    let rebase = tree.rebase;
+    let mut triangles = (prepared.soup.len() as u32).to_le_bytes().to_vec();
+    for corner in prepared.soup.positions.iter().flatten() {
+        triangles.extend(rebase.point(*corner).to_array().iter().flat_map(|value| value.to_le_bytes()));
+    }
+    let mut lines = Vec::with_capacity(32 * rays.len());
+    for ray in rays {
+        let (origin, direction) = (rebase.point(ray.origin), rebase.direction(ray.direction));
+        let values = [origin.x, origin.y, origin.z, 0.0, direction.x, direction.y, direction.z, 1e30];
+        lines.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    }
+    film::write_whole(&folder.join(format!("{name}.bin")), &triangles)?;
+    film::write_whole(&folder.join(format!("{name}.rays")), &lines)
 }
 
 /// Points inside a mesh in its own space, from which every ray must hit it.
@@ -60,13 +83,15 @@ pub(super) fn leaks(stress: &mut Stress) -> Result<()> {
         let settings = scales.iter().map(|scale| ("scale", *scale, *scale, 0.0));
         let settings = settings.chain(offsets.iter().map(|offset| ("offset", *offset, 1.0, *offset)));
         for (what, value, scale, offset) in settings.collect::<Vec<_>>() {
-            stress.row(&format!("{name}, {what}"), value, |stress| leak(stress, &mesh, inside, scale, offset))?;
+            stress.row(&format!("{name}, {what}"), value, |stress| {
+                leak(stress, &format!("{name}-{what}-{value:e}"), &mesh, inside, scale, offset)
+            })?;
         }
     }
     Ok(())
 }
 
-fn leak(stress: &Stress, mesh: &Mesh, inside: Inside, scale: f64, offset: f64) -> Result<Finding> {
+fn leak(stress: &Stress, name: &str, mesh: &Mesh, inside: Inside, scale: f64, offset: f64) -> Result<Finding> {
     let transform = DMat4::from_translation(DVec3::splat(offset * scale)) * DMat4::from_scale(DVec3::splat(scale));
     let scene = scene_of([(mesh.clone(), transform, grey(1.0, 0.0, 0.0))], Vec::new());
     let mut random = Random::new(11);
@@ -85,7 +110,7 @@ fn leak(stress: &Stress, mesh: &Mesh, inside: Inside, scale: f64, offset: f64) -
         };
         (0..count).map(ray).collect()
     };
-    let (_, rays, met) = stress.nearest(&scene, eye, eye + DVec3::Z * scale, make)?;
+    let (_, rays, met) = stress.nearest(name, &scene, eye, eye + DVec3::Z * scale, make)?;
     let missed = met.iter().filter(|met| **met == Met::Nothing).count();
     Ok(Finding::none_of(rays.len() as u64, missed as u64))
 }
@@ -115,14 +140,16 @@ pub(super) fn needles(stress: &mut Stress) -> Result<()> {
     let aspects = stress.few(&[1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8], &[1e2, 1e4, 1e6, 1e8]);
     for (name, transform) in [("tilted", tilt()), ("along axes", DMat4::IDENTITY)] {
         for aspect in &aspects {
-            stress.row(&format!("aspect, {name}"), *aspect, |stress| needle(stress, *aspect, transform))?;
+            stress.row(&format!("aspect, {name}"), *aspect, |stress| {
+                needle(stress, &format!("{name}-{aspect:e}"), *aspect, transform)
+            })?;
         }
     }
     Ok(())
 }
 
 /// Rays that miss, or hit further from where they should than the sliver's shape lets f32 know.
-fn needle(stress: &Stress, aspect: f64, transform: DMat4) -> Result<Finding> {
+fn needle(stress: &Stress, name: &str, aspect: f64, transform: DMat4) -> Result<Finding> {
     let width = 1.0 / aspect.max(2.1 * f64::from(SLIVERS));
     let scene = scene_of([(sliced_square(width), transform, grey(1.0, 0.0, 0.0))], Vec::new());
     let eye = transform.transform_point3(DVec3::new(0.3, 0.2, 1.0));
@@ -141,7 +168,7 @@ fn needle(stress: &Stress, aspect: f64, transform: DMat4) -> Result<Finding> {
         };
         (0..count).map(ray).collect()
     };
-    let (prepared, rays, met) = stress.nearest(&scene, eye, transform.transform_point3(DVec3::ZERO), make)?;
+    let (prepared, rays, met) = stress.nearest(name, &scene, eye, transform.transform_point3(DVec3::ZERO), make)?;
     let is_wrong = |(ray, met): (&Ray, &Met)| {
         let Met::Triangle { primitive, barycentrics, .. } = *met else { return true };
         let corners = prepared.soup.positions[primitive as usize];
@@ -156,5 +183,47 @@ fn needle(stress: &Stress, aspect: f64, transform: DMat4) -> Result<Finding> {
         exceeds(beside, bound)
     };
     let wrong = rays.iter().zip(&met).filter(|pair| is_wrong(*pair)).count();
+    Ok(Finding::none_of(rays.len() as u64, wrong as u64))
+}
+
+/// Rays that start on the faces of a tilted cube, outward and inward, at an angle to the face, from where the shading passes would
+/// let them start.
+pub(super) fn leaving_faces(stress: &mut Stress) -> Result<()> {
+    for angle in stress.few(&[1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6], &[1e-2, 1e-4, 1e-6]) {
+        for (name, side) in [("outward", 1.0), ("inward", -1.0)] {
+            stress.row(&format!("rays {name}, grazing angle"), angle, |stress| leaving(stress, name, side, angle))?;
+        }
+    }
+    Ok(())
+}
+
+fn leaving(stress: &Stress, name: &str, side: f64, angle: f64) -> Result<Finding> {
+    let transform = tilt();
+    let scene = scene_of([(shapes::cube(), transform, grey(1.0, 0.0, 0.0))], Vec::new());
+    let mut random = Random::new(31);
+    let make = |prepared: &Prepared, count: usize| {
+        let triangles = &prepared.soup.positions;
+        let ray = |_| {
+            let corners = triangles[random.below(triangles.len())];
+            // As the shading passes have it: an f32 point, moved off the face by its error bound and a little away from the edges.
+            let (mut l2, mut l3) = (random.unit(), random.unit());
+            if l2 + l3 > 1.0 {
+                (l2, l3) = (1.0 - l2, 1.0 - l3);
+            }
+            let point = corners[0] * (1.0 - l2 - l3) + corners[1] * l2 + corners[2] * l3;
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize() * side;
+            let along = random.in_cube().reject_from(normal).normalize();
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - point;
+            let error = POINT_ERROR * point.abs().max_element();
+            let origin = point + normal * error + middle.normalize() * (4.0 * error).min(0.01 * middle.length());
+            let direction = along * angle.cos() + normal * angle.sin();
+            Ray { origin: origin.as_vec3().as_dvec3(), direction, t_max: f64::MAX }
+        };
+        (0..count).map(ray).collect()
+    };
+    let name = format!("{name}-{angle:e}");
+    let (_, rays, met) = stress.nearest(&name, &scene, DVec3::ZERO, DVec3::Z, make)?;
+    let meets = |met: &Met| *met != Met::Nothing;
+    let wrong = met.iter().filter(|met| meets(met) != (side < 0.0)).count();
     Ok(Finding::none_of(rays.len() as u64, wrong as u64))
 }

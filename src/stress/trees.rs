@@ -55,7 +55,7 @@ pub(super) fn trees_that_hurt(stress: &mut Stress) -> Result<()> {
         ("triangles in all", 1, |count| few(count, 1)),
         ("triangles in all", 2, |count| few(count, 1)),
     ];
-    if !stress.quick {
+    if !stress.settings.quick {
         kinds.push(("triangles over each other", 1_000_000, overlapping));
         kinds.push(("triangles about one centre", 1_000_000, concentric));
     }
