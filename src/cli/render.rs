@@ -10,7 +10,7 @@ use glimt::scene::{Background, Soup};
 use glimt::vulkan::DeviceChoice;
 use glimt::{reference, report, Error, Options, Report, Result, Scene};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Flags of `glimt render`.
 #[derive(Args)]
@@ -24,6 +24,12 @@ pub struct RenderArgs {
     /// Bits a channel of a PNG
     #[arg(long, value_name = "8|16", default_value_t = 8, value_parser = bits)]
     bits: u8,
+    /// Add samples until the estimated RMSE in linear RGB is this small, instead of --spp
+    #[arg(long, value_name = "RMSE")]
+    target_error: Option<f64>,
+    /// Add samples until so many seconds after the start, instead of --spp
+    #[arg(long, value_name = "SECONDS")]
+    max_time: Option<f64>,
     #[command(flatten)]
     machine: MachineArgs,
     /// Print one JSON object on standard output, nothing else
@@ -51,6 +57,8 @@ impl RenderArgs {
         options.validate = self.machine.validate;
         options.interrupted = context.interrupted.clone();
         options.progress = if self.quiet { None } else { progress::bar() };
+        options.target_error = self.target_error;
+        options.deadline = self.max_time.map(|seconds| deadline(context.started, seconds)).transpose()?;
         let target = Target::of(&self)?;
         if target.format == Format::Hdr && options.background == Background::Transparent {
             return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
@@ -58,6 +66,11 @@ impl RenderArgs {
         self.machine.set_threads()?;
 
         let (film, mut report) = match self.machine.device.as_deref() {
+            Some("reference") if options.target_error.is_some() || options.deadline.is_some() => {
+                return Err(Error::Usage(
+                    "the reference renders --spp samples, not until an error or a time is reached".into(),
+                ));
+            }
             Some("reference") => self.on_reference(&options)?,
             device => {
                 options.device = device.map_or(DeviceChoice::Best, |name| DeviceChoice::Named(name.into()));
@@ -66,7 +79,7 @@ impl RenderArgs {
         };
         let start = Instant::now();
         let mut outcome = Outcome::default();
-        let saved = target.save(&film, &mut outcome.stdout, || stop_if_interrupted(&options))?;
+        let saved = target.save(&film, &notes(&report), &mut outcome.stdout, || stop_if_interrupted(&options))?;
         report.times_ms.save = milliseconds(start);
         report.times_ms.total = milliseconds(context.started);
         report.image.path = target.path.display().to_string();
@@ -128,6 +141,25 @@ impl RenderArgs {
     }
 }
 
+/// So many seconds after the start.
+fn deadline(start: Instant, seconds: f64) -> Result<Instant> {
+    let after = Duration::try_from_secs_f64(seconds).ok().and_then(|after| start.checked_add(after));
+    after.ok_or_else(|| Error::Usage(format!("--max-time {seconds}: must be a number of seconds from 0")))
+}
+
+/// What the file says of a picture that was made until an error or a time was reached.
+fn notes(report: &Report) -> Vec<(&'static str, String)> {
+    let Some(reached) = report.convergence else { return Vec::new() };
+    vec![
+        ("Software", format!("glimt {}", env!("CARGO_PKG_VERSION"))),
+        ("glimt:samples", reached.samples.to_string()),
+        ("glimt:rmse", format!("{:.6e}", reached.error)),
+        ("glimt:seconds", format!("{:.3}", reached.seconds)),
+        ("glimt:stopped-by", reached.reached.into()),
+        ("glimt:device", format!("{} ({})", report.device.name, report.device.driver)),
+    ]
+}
+
 /// Where the picture goes.
 struct Target {
     path: PathBuf,
@@ -157,11 +189,17 @@ impl Target {
         Ok(Self { path, format, is_stdout })
     }
 
-    fn save(&self, film: &Film, stdout: &mut Vec<u8>, may_finish: impl FnOnce() -> Result<()>) -> Result<Saved> {
+    fn save(
+        &self,
+        film: &Film,
+        notes: &[(&str, String)],
+        stdout: &mut Vec<u8>,
+        may_finish: impl FnOnce() -> Result<()>,
+    ) -> Result<Saved> {
         if self.is_stdout {
-            return film.encode(stdout, self.format, &self.path);
+            return film.encode(stdout, self.format, notes, &self.path);
         }
-        film.save(&self.path, self.format, may_finish)
+        film.save_with_notes(&self.path, self.format, notes, may_finish)
     }
 }
 

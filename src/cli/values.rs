@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use glam::DVec3;
 use glimt::bvh::Quality;
-use glimt::scene::Instancing;
+use glimt::scene::{Filter, Instancing, Sampler};
 
 /// How much work goes into the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -43,6 +43,51 @@ impl From<InstancingChoice> for Instancing {
             InstancingChoice::Auto => Self::Auto,
             InstancingChoice::Shared => Self::Shared,
             InstancingChoice::Flat => Self::Flat,
+        }
+    }
+}
+
+/// Where samples lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SamplerChoice {
+    /// Sobol's sequence, scrambled
+    Sobol,
+    /// One sample in each cell, column and row of the pixel
+    Stratified,
+    /// Independent of each other
+    Independent,
+}
+
+impl From<SamplerChoice> for Sampler {
+    fn from(choice: SamplerChoice) -> Self {
+        match choice {
+            SamplerChoice::Sobol => Self::Sobol,
+            SamplerChoice::Stratified => Self::Stratified,
+            SamplerChoice::Independent => Self::Independent,
+        }
+    }
+}
+
+/// How samples are weighed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FilterChoice {
+    /// Evenly over the pixel
+    Box,
+    /// A triangle two pixels wide
+    Tent,
+    /// Four pixels wide, soft
+    BlackmanHarris,
+    /// Four pixels wide, sharp
+    Mitchell,
+}
+
+impl From<FilterChoice> for Filter {
+    fn from(choice: FilterChoice) -> Self {
+        match choice {
+            FilterChoice::Box => Self::Box,
+            FilterChoice::Tent => Self::Tent,
+            FilterChoice::BlackmanHarris => Self::BlackmanHarris,
+            FilterChoice::Mitchell => Self::Mitchell,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Flags that choose the picture, the same for every command that renders.
 
-use super::values::{size, vector, BvhChoice, InstancingChoice};
+use super::values::{size, vector, BvhChoice, FilterChoice, InstancingChoice, SamplerChoice};
 use clap::Args;
 use glam::DVec3;
 use glimt::scene::{Background, CameraChoice};
@@ -12,9 +12,18 @@ pub struct ViewArgs {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1024x768", value_parser = size)]
     size: (u32, u32),
-    /// Samples a pixel, stratified; 1 goes through the pixel's centre
+    /// Samples a pixel; 1 goes through the pixel's centre
     #[arg(long, value_name = "N", default_value_t = 1)]
     spp: u32,
+    /// Where samples lie in a pixel
+    #[arg(long, value_enum, default_value_t = SamplerChoice::Sobol)]
+    sampler: SamplerChoice,
+    /// How samples are weighed around a pixel's centre
+    #[arg(long, value_enum, default_value_t = FilterChoice::Box)]
+    filter: FilterChoice,
+    /// Other positions of samples for each number
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u32,
     /// Reflections one after the other; 0 for none
     #[arg(long, value_name = "N", default_value_t = 8)]
     max_depth: u32,
@@ -83,6 +92,9 @@ impl ViewArgs {
         Ok(Options {
             size: self.size,
             samples: self.spp,
+            sampler: self.sampler.into(),
+            filter: self.filter.into(),
+            seed: self.seed,
             max_depth: self.max_depth,
             camera,
             up: self.up,
@@ -102,6 +114,7 @@ impl ViewArgs {
 mod tests {
     use super::*;
     use clap::Parser;
+    use glimt::scene::{Filter, Sampler};
 
     #[derive(Parser)]
     struct Only {
@@ -134,11 +147,12 @@ mod tests {
     fn each_flag_sets_its_option() {
         let own = options(
             "--size 3x4 --spp 5 --max-depth 6 --background black --eye -1,2,3 --target 0,0,1 --up 0,0,1 --fov 90 \
-             --no-default-light --samples-in-flight 128 --all-features --scene 1",
+             --no-default-light --samples-in-flight 128 --all-features --scene 1 --sampler stratified --filter tent --seed 9",
         );
         let own = own.unwrap();
         assert_eq!((own.size, own.samples, own.max_depth), ((3, 4), 5, 6));
         assert_eq!(own.background, Background::Constant(DVec3::ZERO));
+        assert_eq!((own.sampler, own.filter, own.seed), (Sampler::Stratified, Filter::Tent, 9));
         let eye = DVec3::new(-1.0, 2.0, 3.0);
         assert_eq!(own.camera, CameraChoice::LookAt { eye, target: Some(DVec3::Z) });
         assert_eq!((own.up, own.fov), (DVec3::Z, Some(std::f64::consts::FRAC_PI_2)));

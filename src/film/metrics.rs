@@ -1,7 +1,8 @@
 //! How far two pictures are apart.
 //!
-//! All metrics look at the picture as it is shown: sRGB, 0 to 1, transparent parts on black. FLIP (Andersson et al., HPG
-//! 2020) is by the `nv-flip` crate at 67 pixels a degree, SSIM (Wang et al. 2004) by `image-compare`.
+//! [`compare`] looks at the picture as it is shown: sRGB, 0 to 1, transparent parts on black. FLIP (Andersson et al., HPG
+//! 2020) is by the `nv-flip` crate at 67 pixels a degree, SSIM (Wang et al. 2004) by `image-compare`. [`compare_linear`] looks at
+//! radiance.
 
 use super::Film;
 use crate::error::{Error, Result};
@@ -23,6 +24,37 @@ pub struct Metrics {
     pub ssim: f64,
     /// Mean FLIP error.
     pub flip: f64,
+}
+
+/// Distances in linear RGB times alpha, as rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LinearMetrics {
+    /// Root of the mean squared difference.
+    pub rmse: f64,
+    /// Mean of the squared difference over the reference's square plus 0.01 (Rousselle, Knaus and Zwicker, SIGGRAPH Asia 2011).
+    pub rel_mse: f64,
+    /// Largest difference of any channel.
+    pub max: f64,
+}
+
+/// Linear metrics of `test` against `reference`.
+///
+/// # Errors
+/// `Usage` when the sizes differ.
+pub fn compare_linear(reference: &Film, test: &Film) -> Result<LinearMetrics> {
+    same_size(reference, test)?;
+    let (mut squares, mut relative, mut max) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for (a, b) in reference.pixels.iter().zip(&test.pixels) {
+        for channel in 0..3 {
+            let (a, b) = (f64::from(a[channel]), f64::from(b[channel]));
+            let square = (a - b) * (a - b);
+            squares += square;
+            relative += square / (a * a + 0.01);
+            max = max.max((a - b).abs());
+        }
+    }
+    let count = 3.0 * reference.pixels.len() as f64;
+    Ok(LinearMetrics { rmse: (squares / count).sqrt(), rel_mse: relative / count, max })
 }
 
 /// Shown value of every pixel, on black.

@@ -4,7 +4,7 @@ mod metrics;
 mod read;
 mod write;
 
-pub use metrics::{compare, heat_map, Metrics};
+pub use metrics::{compare, compare_linear, heat_map, LinearMetrics, Metrics};
 pub use read::read;
 pub use write::{check_writable, write_whole, Format, Saved};
 

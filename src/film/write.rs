@@ -2,8 +2,9 @@
 
 use super::Film;
 use crate::error::{Error, Result};
-use image::codecs::{hdr::HdrEncoder, openexr::OpenExrEncoder, png};
-use image::{ExtendedColorType, ImageEncoder, ImageError, Rgb};
+use exr::prelude::{Image, Layer, LayerAttributes, SpecificChannels, Text, WritableImage};
+use image::codecs::hdr::HdrEncoder;
+use image::Rgb;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::io::{BufWriter, Cursor, Write};
@@ -89,11 +90,25 @@ impl Film {
     /// # Errors
     /// `Write` when that fails; `Usage` when the format cannot hold the picture; whatever `may_finish` answers.
     pub fn save(&self, path: &Path, format: Format, may_finish: impl FnOnce() -> Result<()>) -> Result<Saved> {
+        self.save_with_notes(path, format, &[], may_finish)
+    }
+
+    /// As [`Film::save`], with notes (keyword and text) in the file: PNG text chunks, the EXR layer's comments, HDR comment lines.
+    ///
+    /// # Errors
+    /// As [`Film::save`].
+    pub fn save_with_notes(
+        &self,
+        path: &Path,
+        format: Format,
+        notes: &[(&str, String)],
+        may_finish: impl FnOnce() -> Result<()>,
+    ) -> Result<Saved> {
         // Behind a symbolic link the picture it names is replaced, not the link.
         let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let mut file = temporary(&target)?;
         let mut writer = BufWriter::new(file.as_file_mut());
-        let saved = self.encode(&mut writer, format, path)?;
+        let saved = self.encode(&mut writer, format, notes, path)?;
         writer.flush().map_err(|error| Error::write(path, error))?;
         drop(writer);
         may_finish()?;
@@ -105,59 +120,98 @@ impl Film {
     ///
     /// # Errors
     /// As [`Film::save`]; `name` stands for the stream in messages.
-    pub fn encode(&self, writer: &mut impl Write, format: Format, name: &Path) -> Result<Saved> {
-        let failed = |error: ImageError| Error::write(name, error);
-        let (width, height) = (self.width, self.height);
+    pub fn encode(
+        &self,
+        writer: &mut impl Write,
+        format: Format,
+        notes: &[(&str, String)],
+        name: &Path,
+    ) -> Result<Saved> {
+        let sha256 = match format {
+            Format::Png8 | Format::Png16 => self.encode_png(writer, format == Format::Png16, notes, name)?,
+            Format::Exr => self.encode_exr(writer, notes, name)?,
+            Format::Hdr => self.encode_hdr(writer, notes, name)?,
+        };
+        Ok(Saved { sha256 })
+    }
+
+    fn encode_png(&self, writer: &mut impl Write, deep: bool, notes: &[(&str, String)], name: &Path) -> Result<String> {
+        let failed = |error: png::EncodingError| Error::write(name, error);
         let pixels = 0..self.pixels.len();
         let channels = if self.has_alpha { 4 } else { 3 };
-        let sha256;
-        match format {
-            Format::Png8 | Format::Png16 => {
-                let encoder =
-                    png::PngEncoder::new_with_quality(writer, png::CompressionType::Fast, png::FilterType::Adaptive);
-                let deep = format == Format::Png16;
-                let bytes: Vec<u8> = if deep {
-                    let sample = |value: f32| ((value * 65535.0 + 0.5) as u16).to_ne_bytes();
-                    pixels
-                        .into_par_iter()
-                        .flat_map_iter(|i| self.srgb(i).into_iter().take(channels).flat_map(sample))
-                        .collect()
-                } else {
-                    pixels.into_par_iter().flat_map_iter(|i| self.srgb8(i).into_iter().take(channels)).collect()
-                };
-                sha256 = digest(&bytes);
-                let color = match (self.has_alpha, deep) {
-                    (false, false) => ExtendedColorType::Rgb8,
-                    (true, false) => ExtendedColorType::Rgba8,
-                    (false, true) => ExtendedColorType::Rgb16,
-                    (true, true) => ExtendedColorType::Rgba16,
-                };
-                encoder.write_image(&bytes, width, height, color).map_err(failed)?;
-            }
-            Format::Exr => {
-                let samples: Vec<f32> =
-                    self.pixels.iter().flat_map(|pixel| pixel.iter().copied().take(channels)).collect();
-                let bytes: &[u8] = bytemuck::cast_slice(&samples);
-                sha256 = digest(bytes);
-                let color = if self.has_alpha { ExtendedColorType::Rgba32F } else { ExtendedColorType::Rgb32F };
-                // The encoder seeks, a pipe cannot.
-                let mut file = Cursor::new(Vec::new());
-                OpenExrEncoder::new(&mut file).write_image(bytes, width, height, color).map_err(failed)?;
-                writer.write_all(file.get_ref()).map_err(|error| Error::write(name, error))?;
-            }
-            Format::Hdr => {
-                if self.has_alpha {
-                    return Err(Error::Usage(
-                        "Radiance HDR has no alpha: write a transparent picture as .png or .exr".into(),
-                    ));
-                }
-                let rgb: Vec<Rgb<f32>> = self.pixels.iter().map(|[r, g, b, _]| Rgb([*r, *g, *b])).collect();
-                let samples: Vec<f32> = rgb.iter().flat_map(|pixel| pixel.0).collect();
-                sha256 = digest(bytemuck::cast_slice(&samples));
-                HdrEncoder::new(writer).encode(&rgb, width as usize, height as usize).map_err(failed)?;
-            }
+        let mut bytes: Vec<u8> = if deep {
+            let sample = |value: f32| ((value * 65535.0 + 0.5) as u16).to_le_bytes();
+            pixels.into_par_iter().flat_map_iter(|i| self.srgb(i).into_iter().take(channels).flat_map(sample)).collect()
+        } else {
+            pixels.into_par_iter().flat_map_iter(|i| self.srgb8(i).into_iter().take(channels)).collect()
+        };
+        let sha256 = digest(&bytes);
+        if deep {
+            // PNG has the high byte first.
+            bytes.par_chunks_exact_mut(2).for_each(<[u8]>::reverse);
         }
-        Ok(Saved { sha256 })
+        let mut encoder = png::Encoder::new(writer, self.width, self.height);
+        encoder.set_color(if self.has_alpha { png::ColorType::Rgba } else { png::ColorType::Rgb });
+        encoder.set_depth(if deep { png::BitDepth::Sixteen } else { png::BitDepth::Eight });
+        encoder.set_compression(png::Compression::Fast);
+        encoder.set_filter(png::Filter::Adaptive);
+        for (keyword, text) in notes {
+            encoder.add_text_chunk((*keyword).into(), text.clone()).map_err(failed)?;
+        }
+        let mut png = encoder.write_header().map_err(failed)?;
+        png.write_image_data(&bytes).map_err(failed)?;
+        png.finish().map_err(failed)?;
+        Ok(sha256)
+    }
+
+    fn encode_exr(&self, writer: &mut impl Write, notes: &[(&str, String)], name: &Path) -> Result<String> {
+        let channels = if self.has_alpha { 4 } else { 3 };
+        let samples: Vec<f32> = self.pixels.iter().flat_map(|pixel| pixel.iter().copied().take(channels)).collect();
+        let sha256 = digest(bytemuck::cast_slice(&samples));
+        let size = (self.width as usize, self.height as usize);
+        let pixel = |place: exr::prelude::Vec2<usize>| self.pixels[place.y() * size.0 + place.x()];
+        let mut attributes = LayerAttributes::default();
+        if !notes.is_empty() {
+            let lines: Vec<String> = notes.iter().map(|(keyword, text)| format!("{keyword}: {text}")).collect();
+            attributes.comments = Text::new_or_none(lines.join("; "));
+        }
+        let encoding = exr::prelude::Encoding::FAST_LOSSLESS;
+        // The encoder seeks, a pipe cannot.
+        let mut file = Cursor::new(Vec::new());
+        let written = if self.has_alpha {
+            let rgba = SpecificChannels::rgba(|place| {
+                let [r, g, b, a] = pixel(place);
+                (r, g, b, a)
+            });
+            Image::from_layer(Layer::new(size, attributes, encoding, rgba)).write().to_buffered(&mut file)
+        } else {
+            let rgb = SpecificChannels::rgb(|place| {
+                let [r, g, b, _] = pixel(place);
+                (r, g, b)
+            });
+            Image::from_layer(Layer::new(size, attributes, encoding, rgb)).write().to_buffered(&mut file)
+        };
+        written.map_err(|error| Error::write(name, error))?;
+        writer.write_all(file.get_ref()).map_err(|error| Error::write(name, error))?;
+        Ok(sha256)
+    }
+
+    fn encode_hdr(&self, writer: &mut impl Write, notes: &[(&str, String)], name: &Path) -> Result<String> {
+        if self.has_alpha {
+            return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
+        }
+        let rgb: Vec<Rgb<f32>> = self.pixels.iter().map(|[r, g, b, _]| Rgb([*r, *g, *b])).collect();
+        let samples: Vec<f32> = rgb.iter().flat_map(|pixel| pixel.0).collect();
+        let sha256 = digest(bytemuck::cast_slice(&samples));
+        let mut file = Vec::new();
+        let (width, height) = (self.width as usize, self.height as usize);
+        HdrEncoder::new(&mut file).encode(&rgb, width, height).map_err(|error| Error::write(name, error))?;
+        // Comments follow the first line.
+        let first_line = file.iter().position(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let comments: String = notes.iter().map(|(keyword, text)| format!("# {keyword}: {text}\n")).collect();
+        file.splice(first_line..first_line, comments.bytes());
+        writer.write_all(&file).map_err(|error| Error::write(name, error))?;
+        Ok(sha256)
     }
 }
 

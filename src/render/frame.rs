@@ -11,6 +11,7 @@ use crate::report;
 use crate::scene::{Background, View};
 use crate::vulkan::{Access, Bindings, Buffer, Commands, Kernel, Memory, Usage};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::atomic::Ordering;
 use std::sync::Arc;
 
@@ -35,6 +36,7 @@ pub(super) struct Frame<'a> {
     buffers: BTreeMap<u32, Buffer>,
     /// Where the host reads: the counters of a wave, then the film of a band.
     read_back: Buffer,
+    totals: Totals,
 }
 
 /// Finds the subtrees for rays that are too long for one dispatch, when there are such; `None` where it cannot be divided.
@@ -105,6 +107,7 @@ impl<'a> Frame<'a> {
             again: None,
             parts: vec![0],
             smaller_parts: Some(smaller_parts),
+            totals: Totals::new(&plan),
             prepare: renderer.kernel(&kernels::PREPARE, features)?,
             shade: renderer.kernel(&kernels::SHADE, features)?,
             resolve: renderer.kernel(&kernels::RESOLVE, features)?,
@@ -246,39 +249,46 @@ impl<'a> Frame<'a> {
         Ok(())
     }
 
-    /// Runs all waves of all bands and collects the film.
-    pub fn run(mut self, options: &Options) -> Result<(Film, Outcome)> {
+    /// Runs all waves of all bands for some samples of each pixel, of the sequence that `seed` chooses, and collects their mean.
+    pub fn run(&mut self, samples: Range<u32>, seed: u32, options: &Options) -> Result<Film> {
         let Plan { padded_pixels, band_pixels, wave_samples, .. } = self.plan;
-        let View { samples, first_sample: start, seed, .. } = *self.view;
         let mut film = Film::new(self.view.width, self.view.height, self.view.background == Background::Transparent);
-        let mut totals = Totals::new(&self.plan);
+        let count = samples.end - samples.start;
         for first_pixel in (0..padded_pixels).step_by(band_pixels as usize) {
             let pixels = u64::from(band_pixels).min(padded_pixels - first_pixel) as u32;
-            for done in (0..samples).step_by(wave_samples as usize) {
-                let count = wave_samples.min(samples - done);
+            for first_sample in samples.clone().step_by(wave_samples as usize) {
+                let in_wave = wave_samples.min(samples.end - first_sample);
                 let wave = Step {
                     first_pixel: first_pixel as u32,
                     pixels,
-                    first_sample: start + done,
-                    samples: count,
-                    finish: u32::from(done + count == samples),
+                    first_sample,
+                    samples: in_wave,
+                    finish: u32::from(first_sample + in_wave == samples.end),
                     seed,
-                    start,
+                    start: samples.start,
                     ..Step::default()
                 };
-                while !self.run_wave(wave, options, &mut totals)? {}
+                while !self.run_wave(wave, options)? {}
                 if let Some(progress) = &options.progress {
-                    let done = first_pixel * u64::from(samples) + u64::from(pixels) * u64::from(done + count);
-                    progress(done, padded_pixels * u64::from(samples));
+                    let done = first_sample + in_wave - samples.start;
+                    let done = first_pixel * u64::from(count) + u64::from(pixels) * u64::from(done);
+                    progress(done, padded_pixels * u64::from(count));
                 }
             }
             self.collect(&mut film, first_pixel, pixels)?;
         }
-        Ok((film, totals.outcome(self.view, &self.plan)))
+        self.totals.samples += u64::from(count);
+        self.totals.waves += u64::from(count.div_ceil(wave_samples));
+        Ok(film)
+    }
+
+    /// What all runs so far took.
+    pub fn outcome(&self) -> Outcome {
+        self.totals.outcome(self.view, &self.plan)
     }
 
     /// Runs one wave; false when it must be run once more.
-    fn run_wave(&mut self, wave: Step, options: &Options, totals: &mut Totals) -> Result<bool> {
+    fn run_wave(&mut self, wave: Step, options: &Options) -> Result<bool> {
         if options.interrupted.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
         }
@@ -287,13 +297,14 @@ impl<'a> Frame<'a> {
         let timed = dispatches * (1 + again);
         let mut commands = Commands::new(&self.renderer.device, timed.min(MOST_TIMED) as usize)?;
         self.record(&mut commands, wave);
-        totals.add_times(&commands.submit_and_wait()?);
+        let times = commands.submit_and_wait()?;
+        self.totals.add_times(&times);
         let mut counters = [0; COUNTERS as usize];
         counters.copy_from_slice(bytemuck::cast_slice(&self.read_back.read()?[..4 * COUNTERS as usize]));
         if self.must_run_again(&counters)? {
             return Ok(false);
         }
-        totals.add_counters(&counters);
+        self.totals.add_counters(&counters);
         Ok(true)
     }
 
@@ -334,12 +345,16 @@ struct Totals {
     passes: Vec<report::Pass>,
     /// Items that each queue has had.
     queued: [u64; QUEUES as usize],
+    /// Samples of each pixel.
+    samples: u64,
+    /// Waves of each pixel.
+    waves: u64,
 }
 
 impl Totals {
     fn new(plan: &Plan) -> Self {
         let pass = |planned: &super::PlannedPass| report::Pass { name: planned.name, ..Default::default() };
-        Self { passes: plan.passes.iter().map(pass).collect(), queued: [0; QUEUES as usize] }
+        Self { passes: plan.passes.iter().map(pass).collect(), queued: [0; QUEUES as usize], samples: 0, waves: 0 }
     }
 
     fn add_times(&mut self, times: &[(&'static str, f64)]) {
@@ -360,23 +375,24 @@ impl Totals {
         }
     }
 
-    fn outcome(mut self, view: &View, plan: &Plan) -> Outcome {
+    fn outcome(&self, view: &View, plan: &Plan) -> Outcome {
+        let mut passes = self.passes.clone();
         let pixels = u64::from(view.width) * u64::from(view.height);
-        let primary = pixels * u64::from(view.samples);
+        let primary = pixels * self.samples;
         let queued = |queue: u32| self.queued[queue as usize];
         let (shadow, reflection) = (queued(QUEUE_SHADOW), queued(QUEUE_REFLECTION));
-        for pass in &mut self.passes {
+        for pass in &mut passes {
             pass.items = match pass.name {
                 "primary" => primary,
                 "shade" => self.queued[QUEUE_HIT as usize] * u64::from(plan.lights),
                 "shadow" => shadow,
                 "reflection" => reflection,
                 "retrace" => self.queued[QUEUE_RETRACE as usize],
-                "resolve" => pixels * u64::from(view.samples.div_ceil(plan.wave_samples)),
+                "resolve" => pixels * self.waves,
                 _ => pass.dispatches,
             };
         }
         let rays = report::Rays { primary, shadow, reflection };
-        Outcome { passes: self.passes, rays, queue_bytes: plan.queue_bytes() }
+        Outcome { passes, rays, queue_bytes: plan.queue_bytes() }
     }
 }

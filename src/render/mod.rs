@@ -3,6 +3,7 @@
 mod frame;
 mod options;
 mod plan;
+mod progressive;
 pub mod ray_sets;
 mod trace;
 mod tree;
@@ -203,14 +204,22 @@ impl Renderer {
         // No queue may be larger than what the device binds at once.
         let most = self.device.info.max_storage_bytes / size_of::<RayItem>() as u64;
         let in_flight = options.samples_in_flight.min(u32::try_from(most).unwrap_or(u32::MAX));
+        progressive::check(options)?;
         let plan = Plan::new(scene, soup, view, features, tree.size(), in_flight);
         let start = Instant::now();
         let device_tree = tree.for_device(soup, view.camera.eye);
         let on_device = upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase };
-        let frame = frame::Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts()))?;
+        let mut frame = frame::Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts()))?;
         let upload = milliseconds(start);
         let start = Instant::now();
-        let (film, outcome) = frame.run(options)?;
+        let (film, convergence) = if progressive::is_wanted(options) {
+            let (film, convergence) = progressive::run(&mut frame, view, options)?;
+            (film, Some(convergence))
+        } else {
+            let samples = view.first_sample..view.first_sample + view.samples;
+            (frame.run(samples, view.seed, options)?, None)
+        };
+        let outcome = frame.outcome();
         let render = milliseconds(start);
         let messages = self.device.instance.messages();
         if !messages.is_empty() {
@@ -223,6 +232,7 @@ impl Renderer {
             features: features.needs().collect(),
             passes: outcome.passes,
             rays: outcome.rays,
+            convergence,
             bvh: tree.report(),
             times_ms: report::Times { device: self.opened_in_ms, upload, render, ..Default::default() },
             memory_bytes: report::Memory { device_peak: self.device.peak_memory(), queues: outcome.queue_bytes },

@@ -7,6 +7,7 @@ use crate::vulkan::DeviceChoice;
 use glam::DVec3;
 use std::sync::atomic::AtomicBool;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Called with the samples done and the samples in all, some times a second.
 pub type Progress = Arc<dyn Fn(u64, u64) + Send + Sync>;
@@ -51,6 +52,10 @@ pub struct Options {
     pub filter: Filter,
     /// Chooses between samplers' sequences. Default 0.
     pub seed: u32,
+    /// Passes of more and more samples until the estimated RMSE in linear RGB is this, instead of `samples`.
+    pub target_error: Option<f64>,
+    /// Passes of more and more samples until then, instead of `samples`. The first pass is always run.
+    pub deadline: Option<Instant>,
     /// Device. Default: the best.
     pub device: DeviceChoice,
     /// Validation layers on; any message is an error. Default false.
@@ -85,6 +90,8 @@ impl Default for Options {
             sampler: Sampler::default(),
             filter: Filter::default(),
             seed: 0,
+            target_error: None,
+            deadline: None,
             device: DeviceChoice::Best,
             validate: false,
             samples_in_flight: 1 << 17,
@@ -116,7 +123,9 @@ impl Options {
     pub fn view(&self, scene: &Scene, soup: &Soup) -> Result<View> {
         let aspect = f64::from(self.size.0.max(1)) / f64::from(self.size.1.max(1));
         let camera = scene.camera(soup, &self.camera, self.up, self.fov, aspect)?;
-        let mut view = View::new(scene, camera, self.size, self.samples, self.max_depth)?;
+        let in_passes = super::progressive::is_wanted(self);
+        let samples = if in_passes { super::progressive::PLANNED } else { self.samples };
+        let mut view = View::new(scene, camera, self.size, samples, self.max_depth)?;
         view.background = self.background;
         (view.sampler, view.filter, view.seed) = (self.sampler, self.filter, self.seed);
         Ok(if self.default_light { view.with_default_light(scene) } else { view })

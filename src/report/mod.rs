@@ -26,6 +26,9 @@ pub struct Report {
     pub passes: Vec<Pass>,
     /// Rays traced.
     pub rays: Rays,
+    /// What was reached, where an error or a time was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub convergence: Option<Convergence>,
     /// The tree.
     pub bvh: Tree,
     /// Wall-clock milliseconds.
@@ -102,6 +105,19 @@ pub struct Rays {
     pub reflection: u64,
 }
 
+/// How far a picture in passes came.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Convergence {
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Estimated root of the mean squared error in linear RGB.
+    pub error: f64,
+    /// Seconds of rendering.
+    pub seconds: f64,
+    /// What ended it: `error`, `time`, or the most `samples` there may be.
+    pub reached: &'static str,
+}
+
 /// The tree.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Tree {
@@ -165,6 +181,12 @@ impl Report {
                 ms(self.times_ms.total)
             ),
         ];
+        if let Some(reached) = &self.convergence {
+            lines.push(format!(
+                "{} samples a pixel, estimated RMSE {:.2e}, in {:.2} s: stopped by {}",
+                reached.samples, reached.error, reached.seconds, reached.reached
+            ));
+        }
         lines.extend(self.scene.warnings.iter().map(|warning| format!("warning: {warning}")));
         lines.join("\n")
     }

@@ -31,7 +31,7 @@ pub use material::{Material, Whitted};
 pub use precedence::precedence;
 pub use sampling::{Filter, Sampler};
 pub use soup::{Instancing, Placement, Soup, TriangleFlags};
-pub use view::View;
+pub use view::{View, MAX_SAMPLES};
 
 use glam::{DMat4, Vec3};
 
