@@ -34,6 +34,7 @@ pub mod render;
 pub mod report;
 pub mod scene;
 pub mod stress;
+pub mod study;
 pub mod vulkan;
 
 pub use error::{Error, Result};

@@ -28,9 +28,10 @@ fn code(path: &Path) -> String {
 }
 
 /// Room → rooms it may name.
-const ARROWS: [(&str, &[&str]); 11] = [
+const ARROWS: [(&str, &[&str]); 12] = [
     ("main.rs", &["cli"]),
-    ("cli", &["render", "scene", "film", "report", "reference", "stress", "bvh", "vulkan", "error"]),
+    ("cli", &["render", "scene", "film", "report", "reference", "stress", "study", "bvh", "vulkan", "error"]),
+    ("study", &["render", "scene", "film", "report", "bvh", "error"]),
     ("stress", &["render", "scene", "reference", "film", "report", "layout", "error"]),
     ("render", &["scene", "bvh", "vulkan", "layout", "film", "report", "error"]),
     ("reference", &["scene", "film", "error"]),

@@ -10,6 +10,7 @@ mod machine;
 mod progress;
 mod render;
 mod stress;
+mod study;
 mod values;
 mod view;
 
@@ -61,6 +62,7 @@ Examples:
   glimt explain model.glb                           what is computed, what is left out, and why
   glimt bench model.glb --sets primary,shadow        how fast rays of a view are traced
   glimt stress --quick                              which extreme cases hold on this device
+  glimt study table --size 160x120 --knob spp=4,16,64 --knob sampler=sobol,independent -o study
   glimt diff a.png b.png --max-rmse 0.004           exit code 1 when they differ more
 
 Exit codes: 0 done · 1 a check said no · 2 bad usage or input · 3 no usable device, or it failed · 4 output not written ·
@@ -88,6 +90,8 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Run extreme and stiff cases and say which hold: leaks, self-hits, needles, far away, bad transforms, …
     Stress(stress::StressArgs),
+    /// Report error against run time: turn knobs, compare with a reference, fit slopes
+    Study(study::StudyArgs),
     /// Compare two pictures: RMSE, PSNR, maximum difference, SSIM, FLIP
     Diff(diff::DiffArgs),
     /// Print a completion script for a shell
@@ -97,7 +101,10 @@ enum Command {
 impl Cli {
     /// The command writes a file, so that Ctrl-C must let it clean up.
     pub fn writes_files(&self) -> bool {
-        matches!(self.command, Command::Render(_) | Command::Diff(_) | Command::Bench(_) | Command::Stress(_))
+        matches!(
+            self.command,
+            Command::Render(_) | Command::Diff(_) | Command::Bench(_) | Command::Stress(_) | Command::Study(_)
+        )
     }
 
     /// Runs the command.
@@ -112,6 +119,7 @@ impl Cli {
             Command::Devices(args) => args.run(),
             Command::Bench(args) => args.run(context),
             Command::Stress(args) => args.run(context),
+            Command::Study(args) => args.run(context),
             Command::Diff(args) => args.run(context),
             Command::Completions(args) => args.run(),
         }

@@ -69,6 +69,8 @@ pub(super) fn run(frame: &mut Frame, view: &View, options: &Options) -> Result<(
     let pixels = view.width as usize * view.height as usize;
     let half = |seed| Half { seed, sum: vec![[0.0; 4]; pixels] };
     let mut halves = [half(view.seed.wrapping_mul(2)), half(view.seed.wrapping_mul(2).wrapping_add(1))];
+    // The first pass also compiles: the quickest one tells what a sample takes.
+    let mut a_sample = f64::INFINITY;
     let (mut samples, mut next) = (0_u32, FIRST);
     loop {
         let pass = Instant::now();
@@ -80,7 +82,7 @@ pub(super) fn run(frame: &mut Frame, view: &View, options: &Options) -> Result<(
         }
         samples += next;
         let error = estimated_error(&halves, samples);
-        let a_sample = pass.elapsed().as_secs_f64() / f64::from(next);
+        a_sample = a_sample.min(pass.elapsed().as_secs_f64() / f64::from(next));
         next = samples;
         let mut stop = None;
         if let Some(deadline) = options.deadline {

@@ -3,9 +3,12 @@
 mod bench;
 pub mod page;
 pub mod plot;
+mod slope;
 mod stress;
+pub mod study;
 
 pub use bench::{Bench, BenchTree, Mismatches, Set, Spread};
+pub use slope::{log_log_slope, Slope};
 pub use stress::{stress_page, StressRow};
 
 use serde::Serialize;
