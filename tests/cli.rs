@@ -338,3 +338,72 @@ fn a_benchmark_and_its_files() {
     let refused = bench(&[]);
     assert!(refused.status.code() == Some(2) && text(&refused.stderr).contains("multiples of 8"));
 }
+
+#[test]
+fn stress_prints_rows_and_says_no_when_one_does_not_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let stress = |more: &[&str]| {
+        let arguments = ["stress", "--quick", "--case", "self-hit", "--json"];
+        run(folder.path(), &arguments.iter().chain(more).copied().collect::<Vec<_>>())
+    };
+    let rows = |output: &Output| -> Vec<serde_json::Value> { serde_json::from_slice(&output.stdout).unwrap() };
+    let good = stress(&["--validate", "--html", "page.html", "--export", "rays"]);
+    assert_eq!(good.status.code(), Some(0), "{}", text(&good.stderr));
+    for key in ["case", "parameter", "value", "rays", "wrong", "error", "bound", "ms", "holds"] {
+        assert!(rows(&good).iter().all(|row| row.get(key).is_some()), "{key}");
+    }
+    let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("grazing angle") && !page.contains("class=bad"));
+    let rays = std::fs::metadata(folder.path().join("rays/self-hit-outward-1e-4.rays")).unwrap();
+    assert_eq!(rays.len(), 32 * 256 * 256);
+
+    let bad = stress(&["--sabotage", "fixed-epsilon"]);
+    assert_eq!(bad.status.code(), Some(1));
+    assert!(rows(&bad).iter().any(|row| row["holds"] == false && row["wrong"].as_u64() > Some(0)));
+    assert_fails(&["stress", "--case", "nothing"], 2, "no such case");
+    assert_fails(&["stress", "--html", "no/folder/page.html"], 4, "no/folder/page.html");
+}
+
+#[test]
+fn a_study_and_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments =
+        ["study", "teapot", "--size", "32x24", "--repeats", "2", "--knob", "spp=2,8", "--knob", "filter=box,mitchell"];
+    let more = ["--reference", "64", "--target-rmse", "0.5", "-o", "out", "--json", "--validate"];
+    let output = run(folder.path(), &[&arguments[..], &more[..]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((told["axis"].as_str(), told["series"][1]["name"].as_str()), (Some("spp"), Some("mitchell")));
+    assert_eq!(told["series"][0]["settings"][1]["rmse_of_repeats"].as_array().map(Vec::len), Some(2));
+    assert!(told["series"][0]["cheapest_for_target"].is_string() && told["device"]["name"].is_string());
+    let file = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+    assert_eq!(file("study.csv").lines().count(), 5);
+    assert!(file("study.json").contains("\"command\": \"glimt study teapot"));
+    let page = file("study.html");
+    assert!(page.matches("<img").count() == 10 && page.contains("<svg") && page.contains("glimt study teapot"));
+
+    assert_fails(&["study", "table", "--knob", "speed=1"], 2, "no knob 'speed'");
+    assert_fails(&["study", "table", "--knob", "spp=1", "--knob", "spp=2"], 2, "given twice");
+    assert_fails(&["study", "table", "--knob", "spp=2", "--reference", "nowhere.exr"], 2, "nowhere.exr");
+}
+
+#[test]
+fn a_picture_until_an_error_is_reached_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.png", "a.exr", "a.hdr"] {
+        let output = run(folder.path(), &tiny(&["--target-error", "0.05", "--json", "-o", name]));
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let reached = &told["convergence"];
+        assert!(reached["error"].as_f64() <= Some(0.05) && reached["reached"] == "error", "{reached}");
+        let bytes = std::fs::read(folder.path().join(name)).unwrap();
+        let said = String::from_utf8_lossy(&bytes).into_owned();
+        let rmse = format!("{:.6e}", reached["error"].as_f64().unwrap());
+        assert!(said.contains("glimt:rmse") && said.contains(&rmse), "{name} does not say {rmse}");
+        assert_eq!(glimt::film::read(&folder.path().join(name)).unwrap().width, 32);
+    }
+    assert_fails(&tiny(&["--target-error", "0"]), 2, "above 0");
+    assert_fails(&tiny(&["--max-time", "inf"]), 2, "--max-time inf");
+    assert_fails(&tiny(&["--max-time", "1", "--sampler", "stratified"]), 2, "stratified");
+    assert_fails(&tiny(&["--max-time", "1", "--device", "reference"]), 2, "reference");
+}

@@ -7,6 +7,7 @@
 //! * `gltf` — accessors of every kind, hierarchies, faults, written by the tests themselves
 //! * `frames` — pictures: against the reference, closed forms, determinism, features
 //! * `stress` — extreme cases hold, and fail without their safeguards
+//! * `study` — slopes, knobs, estimated against true error
 //! * `cli` — the program: exit codes, messages, files
 //! * `corpus` — real and broken files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
 
@@ -21,4 +22,5 @@ mod gltf;
 mod layout;
 mod scene;
 mod stress;
+mod study;
 mod support;

@@ -77,7 +77,8 @@ fn choice<T: ValueEnum>(name: &str, value: &str) -> Result<T, String> {
     })
 }
 
-/// Widest picture on the page.
+/// Widths of pictures on the page.
+const NARROWEST: u32 = 240;
 const WIDEST: u32 = 560;
 
 impl StudyArgs {
@@ -135,7 +136,7 @@ impl StudyArgs {
                 pictures.push((own.name.clone(), png(&own.film)?, png(&map)?));
             }
             let references = outcome.references.iter().map(png).collect::<Result<Vec<_>>>()?;
-            let width = options.size.0.min(WIDEST);
+            let width = options.size.0.clamp(NARROWEST, WIDEST);
             let json = serde_json::to_vec_pretty(&outcome.study).map_err(|error| Error::write(folder, error))?;
             film::write_whole(&folder.join("study.csv"), outcome.study.csv().as_bytes())?;
             film::write_whole(&folder.join("study.json"), &json)?;

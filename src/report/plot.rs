@@ -83,8 +83,12 @@ where
     X::CoordDescType: ValueFormatter<f64>,
     Y::CoordDescType: ValueFormatter<f64>,
 {
-    let mut chart =
-        ChartBuilder::on(root).margin(8).x_label_area_size(40).y_label_area_size(64).build_cartesian_2d(x, y)?;
+    let mut chart = ChartBuilder::on(root)
+        .margin(8)
+        .margin_right(26)
+        .x_label_area_size(40)
+        .y_label_area_size(64)
+        .build_cartesian_2d(x, y)?;
     chart
         .configure_mesh()
         .x_desc(labels.0)
@@ -111,10 +115,13 @@ where
             dots.label(&series.name).legend(move |(x, y)| Circle::new((x + 8, y), 3, fill.filled()));
         }
     }
+    // The legend stands where the lines are not.
+    let ends = series.first().and_then(|series| Some((series.points.first()?, series.points.last()?)));
+    let is_rising = ends.is_some_and(|(first, last)| (last.1 - first.1) * (last.0 - first.0) > 0.0);
     if series.len() > 1 {
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
+            .position(if is_rising { SeriesLabelPosition::UpperLeft } else { SeriesLabelPosition::UpperRight })
             .background_style(WHITE.mix(0.8))
             .border_style(RGBColor(200, 200, 200))
             .label_font(("sans-serif", 13))

@@ -175,7 +175,7 @@ impl Study {
         };
         page.text(&format!(
             "Each setting of {} was rendered {} times with different seeds and compared with {of}. RMSE is the root of the mean squared \
-             error in linear RGB; below the dashed-in “reference's own” line nothing can be known. Device time is the sum of the passes \
+             error in linear RGB; below the line “reference's own” nothing can be known. Device time is the sum of the passes \
              by timestamps. The fitted slope says by how much the error falls: −½ means that four times the time halves it.",
             self.axis, self.repeats
         ));
@@ -249,9 +249,10 @@ impl Study {
         page.text("FLIP shows where a person who flips between picture and reference sees a difference: black none, white most.");
         let references: Vec<String> = references.iter().map(|png| picture(png, width, "reference")).collect();
         page.row(&references);
-        for (name, film, map) in pictures {
-            page.row(&[picture(film, width, name), picture(map, width, &format!("FLIP of {name}"))]);
-        }
+        let pairs = pictures.iter().flat_map(|(name, film, map)| {
+            [picture(film, width, name), picture(map, width, &format!("FLIP of {name}"))]
+        });
+        page.row(&pairs.collect::<Vec<_>>());
         page.html()
     }
 }
