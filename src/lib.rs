@@ -16,10 +16,12 @@
 //!                                └─ Features → specialization constants, passes, buffers (render::Plan)
 //! buffers ─render::frame→ primary → per round { prepare → shade → prepare → shadow; reflection } → resolve → Film → file
 //! buffers ─render::trace→ ray sets through the same kernels → report::Bench
+//! scenes by code ─stress→ render, reference → rows that hold or do not      knobs ─study→ render → error against run time
 //! ```
 //! # Rooms, and who may know whom
 //! ```text
 //! main → cli → everything below       render → scene, bvh, vulkan, layout, film, report, error
+//! stress, study → render, scene, film, report, error (stress also reference and layout, study bvh)
 //! reference → scene, film, error      scene → error, layout (features only)       bvh → layout, error
 //! vulkan → error      film → error      layout, report, error → nothing
 //! ```

@@ -5,7 +5,7 @@ use super::{command_line, Context, Outcome};
 use clap::{Args, ValueEnum, ValueHint};
 use glimt::render::{describe_device, Renderer, Sabotage};
 use glimt::report::{stress_page, StressRow};
-use glimt::stress::{run, Case, Settings, CASES};
+use glimt::stress::{failures, run, Case, Settings, CASES};
 use glimt::vulkan::DeviceChoice;
 use glimt::{Error, Options, Result};
 use std::io::{IsTerminal, Write};
@@ -29,6 +29,9 @@ pub struct StressArgs {
     /// Write the rays of cases that trace them one by one, and the triangles they meet, for other programs
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     export: Option<PathBuf>,
+    /// Write pictures of what each safeguard prevents: left with it, right without; runs no case
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pictures: Option<PathBuf>,
     /// List the cases
     #[arg(long)]
     list: bool,
@@ -88,6 +91,10 @@ impl StressArgs {
         }
         let settings = Settings { quick: self.quick, export: self.export.clone() };
         let renderer = Renderer::new(&device, self.machine.validate)?;
+        if let Some(folder) = &self.pictures {
+            let paths = failures::write(&renderer, &options, folder)?;
+            return Ok(Outcome::text(paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>()));
+        }
         let cases: Vec<Case> =
             CASES.into_iter().filter(|case| self.cases.is_empty() || self.cases.contains(&case.name)).collect();
         // On a terminal rows appear as they are found; a pipe gets all of them in the end, or none.

@@ -3,6 +3,7 @@
 //! A [`Case`] writes [`Row`]s, one a value of its parameter. A case must be able to fail: with the safeguard off that it is there for
 //! ([`crate::render::Sabotage`]) it does.
 
+pub mod failures;
 mod numbers;
 mod pictures;
 mod rays;
