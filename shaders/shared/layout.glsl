@@ -72,7 +72,7 @@ const uint LIGHT_DIRECTIONAL = 2u;
 /// Distance that stands for infinity, in world units.
 const float FAR = 1e30;
 
-/// What is constant during a frame. World space is the scene's, moved to the eye, scaled to size 1 and, for a very
+/// What is constant during a frame. World space is the scene's, moved to the eye, scaled to a size of about 2²⁰ and, for a very
 /// narrow view, turned along with the camera.
 struct Frame {
     /// Camera position (perspective) or centre of its plane (orthographic).

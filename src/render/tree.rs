@@ -48,6 +48,10 @@ pub struct Rebase {
     pub rotation: DMat3,
 }
 
+/// Size of a scene on the device, as a power of two. The cube of a length that is 10⁻¹³ of it is still a normal f32, which devices do not take for 0;
+/// the cube of ten times its size is far below the largest.
+const SIZE: f64 = 20.0;
+
 /// Angle of a pixel, in radians, below which the world is turned along with the camera: f32 knows a direction to 6e-8 only, unless it lies along
 /// an axis.
 const NARROW: f64 = 1.5e-5;
@@ -57,8 +61,8 @@ impl Rebase {
     /// rounding errors are in proportion to the distance from it, as the sizes of things in the picture are.
     pub fn new(lo: DVec3, hi: DVec3, eye: DVec3) -> Self {
         let size = (hi - lo).max_element();
-        let exponent = if size > 0.0 && size.is_finite() { size.log2().floor() } else { 0.0 };
-        Self { origin: eye.clamp(lo, hi), scale: (-exponent).exp2(), rotation: DMat3::IDENTITY }
+        let exponent = if size > 0.0 && size.is_finite() { size.log2().floor() } else { SIZE };
+        Self { origin: eye.clamp(lo, hi), scale: (SIZE - exponent).exp2(), rotation: DMat3::IDENTITY }
     }
 
     /// For a scene in this box as a view sees it.
