@@ -402,6 +402,16 @@ fn interrupting_stops_with_an_error() {
 }
 
 #[test]
+fn pieces_of_a_vast_plane_do_not_shadow_each_other() {
+    let ground = (shapes::ground(), DMat4::from_scale(DVec3::splat(1e6)), exact(0.1, 0.5, 0.0, 1.0, 0.0));
+    let scene = scene_of(vec![ground], vec![Light::directional(DVec3::new(1.0, -1.0, 0.3), DVec3::ONE)]);
+    let camera = look(DVec3::new(2.0, 1.5, 3.0), DVec3::Y * 0.3);
+    let film = draw(&scene, &Options { size: (640, 480), camera, ..Options::default() }).0;
+    let dark = film.pixels.iter().filter(|pixel| pixel[0] < 0.2).count();
+    assert_eq!(dark, 0, "pixels in the shadow of nothing");
+}
+
+#[test]
 fn a_vast_plane_does_not_shadow_itself() {
     // The rounding error of a hit grows with the triangle, while what is near the eye is small: up to 2 000 km of tilted
     // ground, seen from 40 cm away, under a sun that grazes it.

@@ -13,8 +13,8 @@ struct Surface {
     uint material;
     /// From position to where shadow rays start: on the curved surface that the vertex normals stand for.
     vec3 bulge;
-    /// From position towards the middle of the triangle, four times as far as the error: what rounding put beyond an edge, and so behind the
-    /// wall that meets this one there, is inside again.
+    /// From position to where it is at least four times the error inside every edge: what rounding put beyond an edge, and so behind the
+    /// wall that meets this one there, is in front of both again.
     vec3 inward;
 };
 
@@ -57,6 +57,16 @@ void place_in_world(uint instance, float condition, vec3 magnitude, inout Surfac
     surface.error = 9.6e-7 * condition * max(world.x, max(world.y, world.z));
 }
 
+/// By how much barycentric coordinates must change for the point to be at least four errors inside every edge, or, in a triangle that is
+/// thinner than that, in the middle.
+vec3 lift_from_edges(vec3 weights, float error, vec3 a, vec3 b, vec3 c) {
+    vec3 edges = vec3(length(c - b), length(a - c), length(b - a));
+    // Each coordinate is the distance from its edge over the height above it, which is twice the area over the edge.
+    vec3 least = min(4.0 * error * edges / max(length(cross(b - a, c - a)), 1e-30), vec3(1.0 / 3.0));
+    vec3 inside = max(weights, least);
+    return inside / (inside.x + inside.y + inside.z) - weights;
+}
+
 /// From a point to the plane through a corner across its normal, where the point lies below.
 vec3 rise(vec3 from_corner, vec3 normal) {
     return -min(dot(from_corner, normal), 0.0) * normal;
@@ -93,9 +103,10 @@ Surface surface_at(HitItem item) {
     float size_c = max(abs(edge_c.x), max(abs(edge_c.y), abs(edge_c.z)));
     vec3 across = cross(edge_b / size_b, edge_c / size_c);
     surface.geometric_normal = normalize(is_placed ? world_normal(item.instance, across) : across);
-    vec3 to_middle = (a + b + c) / 3.0 - (weights.x * a + weights.y * b + weights.z * c);
-    to_middle = is_placed ? world_from_part(item.instance) * to_middle : to_middle;
-    surface.inward = to_middle * min(4.0 * surface.error / max(length(to_middle), 1e-30), 0.01);
+    vec3 lifted = lift_from_edges(weights, 9.6e-7 * max(magnitude.x, max(magnitude.y, magnitude.z)), a, b, c);
+    surface.inward = lifted.y * edge_b + lifted.z * edge_c;
+    if (is_placed)
+        surface.inward = world_from_part(item.instance) * surface.inward;
     surface.normal = surface.geometric_normal;
     surface.bulge = vec3(0.0);
     if (SMOOTH_NORMALS && (flags & TRIANGLE_SMOOTH) != 0u) {
