@@ -112,7 +112,8 @@ fn dice(corners: [Corner; 3], eye: &Eye, pieces: &mut Vec<[Corner; 3]>) {
 }
 
 impl Soup {
-    /// Cuts what reaches from near the eye to very far away, see [the module](self). Only what stands in world space is cut,
+    /// Cuts triangles that reach from near the eye to very far away into pieces that grow with their distance from it, so that f32
+    /// errors do too; without gaps. Only what stands in world space is cut,
     /// not the meshes that instances share.
     pub fn dice(&mut self, eye: DVec3) {
         let Some(range) = self.placements.first().filter(|_| self.has_own_part()).map(|_| self.parts[0].clone()) else {
