@@ -86,12 +86,14 @@ impl DiffArgs {
 
 fn text(metrics: &Metrics) -> String {
     format!(
-        "RMSE {:.6}\nPSNR {:.2} dB\nmaximum difference {:.6}\npixels over 1/255 {:.4} %\nSSIM {:.6}\nFLIP {:.6}\n",
+        "RMSE {:.6}\nPSNR {:.2} dB\nmaximum difference {:.6}\npixels over 1/255 {:.4} %\nSSIM {:.6}\nFLIP {:.6}\n\
+         linear RMSE {:.3e}\n",
         metrics.rmse,
         metrics.psnr,
         metrics.max,
         metrics.over_1_255 * 100.0,
         metrics.ssim,
-        metrics.flip
+        metrics.flip,
+        metrics.linear.rmse
     )
 }

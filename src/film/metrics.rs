@@ -24,6 +24,8 @@ pub struct Metrics {
     pub ssim: f64,
     /// Mean FLIP error.
     pub flip: f64,
+    /// The same in linear RGB, not clamped.
+    pub linear: LinearMetrics,
 }
 
 /// Distances in linear RGB times alpha, as rendered.
@@ -112,6 +114,7 @@ pub fn compare(reference: &Film, test: &Film) -> Result<Metrics> {
         over_1_255: over as f64 / pixels,
         ssim: similarity.score,
         flip: flip.iter().map(|value| f64::from(*value)).sum::<f64>() / pixels,
+        linear: compare_linear(reference, test)?,
     })
 }
 

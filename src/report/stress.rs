@@ -59,7 +59,7 @@ pub fn stress_page(rows: &[StressRow], about: &[(&str, &str)], subject: &str) ->
     page.text(&format!(
         "{} of {} values hold. Each case is a scene made by code, swept over a parameter and judged by f64 arithmetic or a closed form. Left: \
          the share of rays or pixels that are wrong, or the relative error; what is exactly 0 lies on the lower edge, and the most that is \
-         allowed is drawn beside it where it is not 0. Right: run time with making the scene and judging it.",
+         allowed is drawn beside it where it is not 0. Right: run time with making the scene and judging it; below, where there is an error at all, error over run time.",
         rows.len() - failed,
         rows.len()
     ));
@@ -98,10 +98,27 @@ pub fn stress_page(rows: &[StressRow], about: &[(&str, &str)], subject: &str) ->
                 let points = vec![(lo, rows[0].bound), (hi, rows[0].bound)];
                 errors.push(Series { name: "most that is allowed".into(), points, is_line: true });
             }
-            page.row(&[
+            let over_time: Vec<Series> = parameters
+                .iter()
+                .map(|parameter| Series {
+                    name: (*parameter).into(),
+                    points: rows
+                        .iter()
+                        .filter(|row| row.parameter == *parameter && row.error > 0.0 && row.error.is_finite())
+                        .map(|row| (row.ms, row.error))
+                        .collect(),
+                    is_line: true,
+                })
+                .filter(|series| series.points.len() > 1)
+                .collect();
+            let mut plots = vec![
                 log_log("value of the parameter", "error", &errors),
                 log_log("value of the parameter", "run time, ms", &series(|row| row.ms, "")),
-            ]);
+            ];
+            if !over_time.is_empty() {
+                plots.push(log_log("run time, ms", "error", &over_time));
+            }
+            page.row(&plots);
         }
         let cells = |row: &&StressRow| {
             let cells = vec![
