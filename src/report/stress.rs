@@ -107,7 +107,7 @@ pub fn stress_page(rows: &[StressRow], about: &[(&str, &str)], subject: &str) ->
                         .filter(|row| row.parameter == *parameter && row.error > 0.0 && row.error.is_finite())
                         .map(|row| (row.ms, row.error))
                         .collect(),
-                    is_line: true,
+                    is_line: false,
                 })
                 .filter(|series| series.points.len() > 1)
                 .collect();
