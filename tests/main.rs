@@ -6,6 +6,8 @@
 //! * `scene` — shapes, transforms, cameras, materials
 //! * `gltf` — accessors of every kind, hierarchies, faults, written by the tests themselves
 //! * `frames` — pictures: against the reference, closed forms, determinism, features
+//! * `hard_scenes` — pictures that are hard on trees, stacks and f32
+//! * `measuring` — bench, stress and study as programs
 //! * `stress` — extreme cases hold, and fail without their safeguards
 //! * `study` — slopes, knobs, estimated against true error
 //! * `cli` — the program: exit codes, messages, files
@@ -19,7 +21,9 @@ mod cli;
 mod corpus;
 mod frames;
 mod gltf;
+mod hard_scenes;
 mod layout;
+mod measuring;
 mod scene;
 mod stress;
 mod study;

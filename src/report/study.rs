@@ -85,26 +85,12 @@ impl Study {
         );
         for series in &self.series {
             for m in &series.settings {
-                let _ = writeln!(
-                    csv,
-                    "\"{}\",{},{:e},{:e},{:e},{:e},{:e},{},{},{},{},{},{},{},{},{:e}",
-                    series.name,
-                    m.setting,
-                    m.rmse,
-                    m.rel_mse,
-                    m.flip,
-                    m.max,
-                    m.efficiency,
-                    m.wall_ms.median,
-                    m.wall_ms.min,
-                    m.wall_ms.max,
-                    m.device_ms.median,
-                    m.device_ms.min,
-                    m.device_ms.max,
-                    m.build_ms.median,
-                    m.rays,
-                    series.noise_of_reference
-                );
+                let errors = [m.rmse, m.rel_mse, m.flip, m.max, m.efficiency].map(|value| format!("{value:e}"));
+                let times = [m.wall_ms, m.device_ms].map(|ms| format!("{},{},{}", ms.median, ms.min, ms.max));
+                let (errors, times) = (errors.join(","), times.join(","));
+                let (build, noise) = (m.build_ms.median, series.noise_of_reference);
+                let _ =
+                    writeln!(csv, "\"{}\",{},{errors},{times},{build},{},{noise:e}", series.name, m.setting, m.rays);
             }
         }
         csv
