@@ -121,3 +121,17 @@ fn a_vast_plane_does_not_shadow_itself() {
         assert_eq!(dark, 0, "{size} m: {dark} of 12288 pixels lie in the plane's own shadow");
     }
 }
+
+#[test]
+fn of_two_sides_in_one_place_the_front_is_seen() {
+    let sheet = |color, turn| (shapes::ground(), DMat4::from_rotation_x(turn), exact(color, 0.0, 0.0, 1.0, 0.0));
+    let (up, down) = (sheet(0.2, 0.0), sheet(0.7, std::f64::consts::PI));
+    for parts in [vec![up.clone(), down.clone()], vec![down, up]] {
+        let scene = scene_of(parts, Vec::new());
+        for (height, color) in [(0.5, 0.2), (-0.5, 0.7)] {
+            let camera = look(DVec3::new(0.02, height, 0.01), DVec3::ZERO);
+            let film = draw(&scene, &Options { size: (16, 16), camera, fov: Some(0.5), ..Options::default() }).0;
+            assert!(film.pixels.iter().all(|pixel| pixel[0] == color), "from {height}: {:?}", film.pixels[0]);
+        }
+    }
+}
