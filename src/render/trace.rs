@@ -12,7 +12,7 @@ use crate::layout::{
 use crate::scene::{Scene, View};
 use crate::vulkan::{Access, Buffer, Commands, Kernel};
 use glam::{DVec3, Vec3};
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// A scene on the device, ready to trace rays.
@@ -22,6 +22,8 @@ pub struct Tracer<'a> {
     rebase: Rebase,
     /// Primitives in leaf order.
     order: Vec<u32>,
+    /// A renderer does one frame at a time. Dropped last.
+    _alone: MutexGuard<'a, ()>,
 }
 
 /// A ray in world space.
@@ -72,7 +74,8 @@ pub struct Trace {
 }
 
 impl Renderer {
-    /// Puts a prepared scene and its tree on the device, with queues for one ray a pixel of the view.
+    /// Puts a prepared scene and its tree on the device, with queues for one ray a pixel of the view. As long as the tracer lives, other
+    /// frames of this renderer wait.
     ///
     /// # Errors
     /// As [`super::render`].
@@ -82,6 +85,7 @@ impl Renderer {
         prepared: &'a super::Prepared,
         tree: &'a super::Tree,
     ) -> Result<Tracer<'a>> {
+        let alone = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
         let View { width, height, .. } = prepared.view;
         let moller_trumbore = prepared.features.moller_trumbore;
         let features = Features { shadows: true, reflections: true, moller_trumbore, ..Features::default() };
@@ -94,7 +98,7 @@ impl Renderer {
         let device_tree = tree.for_device(soup, view.camera.eye);
         let on_device = upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase };
         let frame = Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts()))?;
-        Ok(Tracer { frame, prepared, rebase: tree.rebase, order: device_tree.order })
+        Ok(Tracer { frame, prepared, rebase: tree.rebase, order: device_tree.order, _alone: alone })
     }
 }
 
