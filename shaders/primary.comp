@@ -4,6 +4,8 @@
 #include "shared/texels.glsl"
 #include "shared/random.glsl"
 #include "shared/filter.glsl"
+#include "shared/texture.glsl"
+#include "shared/alpha.glsl"
 #include "shared/intersect.glsl"
 #include "shared/traverse.glsl"
 #include "shared/light.glsl"
@@ -50,7 +52,8 @@ void main() {
     if (!is_last_part(thread, hit))
         return;
     bool is_hit = hit.triangle != NO_TRIANGLE;
-    radiance[sample_index] = is_hit ? vec4(0.0, 0.0, 0.0, 1.0) : vec4(background(ray.direction), frame.background_alpha);
+    // With LAYERS, shade says how much each of them covers.
+    radiance[sample_index] = is_hit ? vec4(0.0, 0.0, 0.0, LAYERS ? 0.0 : 1.0) : vec4(background(ray.direction), frame.background_alpha);
     if (is_hit)
         hit_queue[queue_append(QUEUE_HIT)] = HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, hit.instance);
 }

@@ -2,11 +2,14 @@
 #include "shared/kernel.glsl"
 #include "shared/queue.glsl"
 #include "shared/texels.glsl"
+#include "shared/texture.glsl"
+#include "shared/alpha.glsl"
 #include "shared/intersect.glsl"
 #include "shared/traverse.glsl"
 #include "shared/light.glsl"
+#include "shared/way.glsl"
 
-/// One thread a reflected ray: nearest hit → hit queue, or background.
+/// One thread a ray that was reflected or goes on behind a surface: nearest hit → hit queue, or background.
 void main() {
     uint thread = interleaved_thread();
     uint index = queue_item(thread, QUEUE_REFLECTION);
@@ -20,11 +23,16 @@ void main() {
     }
     if (!is_last_part(thread, hit))
         return;
+    vec4 left = FETCH_FLOATS(throughputs, item.sample_index);
+    Way way = way_of(left.w);
     if (hit.triangle != NO_TRIANGLE) {
+        if (TEXTURES)
+            throughput[item.sample_index].w = word_of(Way(way.travelled + hit.t, way.mirrors));
         hit_queue[queue_append(QUEUE_HIT)] =
             HitItem(item.sample_index, hit.triangle, hit.barycentrics, item.direction, hit.instance);
     } else {
-        vec3 factor = FETCH_FLOATS(throughputs, item.sample_index).rgb;
-        add_radiance(item.sample_index, factor * background(item.direction));
+        add_radiance(item.sample_index, left.rgb * background(item.direction));
+        if (LAYERS && way.mirrors == 0u)
+            add_coverage(item.sample_index, frame.background_alpha);
     }
 }

@@ -2,10 +2,12 @@
 #include "shared/kernel.glsl"
 #include "shared/queue.glsl"
 #include "shared/texels.glsl"
+#include "shared/texture.glsl"
+#include "shared/alpha.glsl"
 #include "shared/intersect.glsl"
 #include "shared/traverse.glsl"
 
-/// One thread a shadow ray: if nothing blocks the light, what it carries is added to its sample.
+/// One thread a shadow ray: what it carries is added to its sample, as far as nothing blocks it.
 void main() {
     uint thread = interleaved_thread();
     uint index = queue_item(thread, QUEUE_SHADOW);
@@ -20,5 +22,5 @@ void main() {
     if (!is_last_part(thread, hit))
         return;
     if (hit.triangle == NO_TRIANGLE)
-        add_radiance(item.sample_index, FETCH_FLOATS(shadow_radiances, item.sample_index).rgb);
+        add_radiance(item.sample_index, FETCH_FLOATS(shadow_radiances, item.sample_index).rgb * hit.passed);
 }

@@ -72,7 +72,8 @@ fn samples_lie_where_the_reference_puts_them() {
 /// All that materials, lights and cameras can be, in one small scene.
 fn everything() -> Scene {
     let mut colored = shapes::sphere(12);
-    colored.colors = colored.positions.iter().map(|p| (*p * 0.5 + 0.5).clamp(Vec3::ZERO, Vec3::ONE)).collect();
+    colored.colors =
+        colored.positions.iter().map(|p| (*p * 0.5 + 0.5).clamp(Vec3::ZERO, Vec3::ONE).extend(1.0)).collect();
     let at = |x, y, z| DMat4::from_translation(DVec3::new(x, y, z));
     let metal =
         Material { roughness: 0.2, base_color: DVec3::new(0.9, 0.7, 0.3), double_sided: true, ..Material::default() };

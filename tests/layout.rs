@@ -60,8 +60,8 @@ fn rust_offsets_are_the_shaders_offsets() {
             }
         }
     }
-    // Materials, lights and instances are only ever fetched, texel by texel: no kernel declares where their members lie.
-    let is_fetched = |structure: &str| ["Material", "Light", "Instance"].contains(&structure);
+    // Materials, textures, lights and instances are only ever fetched, texel by texel: no kernel declares where their members lie.
+    let is_fetched = |structure: &str| ["Material", "Look", "Texture", "Light", "Instance"].contains(&structure);
     let missing: Vec<_> = expected.keys().filter(|key| !checked.contains(*key) && !is_fetched(&key.0)).collect();
     assert!(missing.is_empty(), "no kernel has {missing:?}");
 }
@@ -69,7 +69,9 @@ fn rust_offsets_are_the_shaders_offsets() {
 #[test]
 fn what_is_fetched_is_whole_texels() {
     let texels = |count: u32| 16 * count as usize;
-    assert_eq!(size_of::<layout::Material>(), texels(layout::MATERIAL_TEXELS));
+    assert_eq!(size_of::<layout::Material>(), texels(layout::LOOK_TEXEL));
+    assert_eq!(size_of::<layout::Look>(), texels(layout::MATERIAL_TEXELS - layout::LOOK_TEXEL));
+    assert_eq!(size_of::<layout::Texture>(), texels(layout::TEXTURE_TEXELS));
     assert_eq!(size_of::<layout::Light>(), texels(layout::LIGHT_TEXELS));
     assert_eq!(size_of::<layout::Instance>(), texels(layout::INSTANCE_TEXELS));
     assert_eq!(size_of::<layout::HitItem>(), texels(layout::ITEM_TEXELS));

@@ -20,59 +20,62 @@
 FETCH_BUFFER(0, nodes)
 /// Triangles in leaf order: three positions as float bits; w = primitive, material, TRIANGLE_ flags.
 FETCH_BUFFER(1, triangles)
-/// Vertex normals by primitive: three vectors as float bits.
-FETCH_BUFFER(2, normals)
-/// Vertex colours by primitive: three linear RGB as float bits.
-FETCH_BUFFER(3, colors)
-/// Materials, MATERIAL_TEXELS each.
-FETCH_BUFFER(4, materials)
+/// By primitive, as float bits: three vertex normals; from frame.first_color on three linear RGBA colours; from frame.first_texcoord on two
+/// sets of texture coordinates at three corners; from frame.first_tangent on three tangents, w = sign of the bitangent.
+FETCH_BUFFER(2, attributes)
+/// Materials, MATERIAL_TEXELS each: a Material and a Look.
+FETCH_BUFFER(3, materials)
 /// Lights, LIGHT_TEXELS each.
-FETCH_BUFFER(5, lights)
+FETCH_BUFFER(4, lights)
 /// Instances, INSTANCE_TEXELS each, in the order of the upper tree's leaves.
-FETCH_BUFFER(6, instances)
+FETCH_BUFFER(5, instances)
+/// Textures, TEXTURE_TEXELS each.
+FETCH_BUFFER(6, textures)
+/// Pixels of all levels of all textures, row by row: four of 8 bits or two of 16 bits a channel in a texel.
+FETCH_BUFFER(7, pixels)
 /// Camera, picture, background, grid.
-UNIFORM_BUFFER(7, Frame, frame)
+UNIFORM_BUFFER(8, Frame, frame)
 /// Hits to shade.
-STORAGE_BUFFER(8, HitItem, hit_queue)
+STORAGE_BUFFER(9, HitItem, hit_queue)
 /// The same, to be read.
-FETCH_VIEW(9, hit_items, hit_queue)
+FETCH_VIEW(10, hit_items, hit_queue)
 /// Shadow rays to trace.
-STORAGE_BUFFER(10, RayItem, shadow_queue)
+STORAGE_BUFFER(11, RayItem, shadow_queue)
 /// The same, to be read.
-FETCH_VIEW(11, shadow_items, shadow_queue)
+FETCH_VIEW(12, shadow_items, shadow_queue)
 /// Reflected rays to trace.
-STORAGE_BUFFER(12, RayItem, reflection_queue)
+STORAGE_BUFFER(13, RayItem, reflection_queue)
 /// The same, to be read.
-FETCH_VIEW(13, reflection_items, reflection_queue)
+FETCH_VIEW(14, reflection_items, reflection_queue)
 /// Rays to trace again: pixel samples, or places in the queue that they came from.
-STORAGE_BUFFER(14, uint, retrace_queue)
+STORAGE_BUFFER(15, uint, retrace_queue)
 /// Counts of the queues' items; lost rays.
-STORAGE_BUFFER(15, uint, counters)
+STORAGE_BUFFER(16, uint, counters)
 /// Arguments of the indirect dispatches, one a queue.
-STORAGE_BUFFER(16, Dispatch, dispatches)
+STORAGE_BUFFER(17, Dispatch, dispatches)
 /// What each pixel sample's shadow ray adds if nothing blocks it.
-STORAGE_BUFFER(17, vec4, shadow_radiance)
+STORAGE_BUFFER(18, vec4, shadow_radiance)
 /// The same, to be read.
-FETCH_VIEW(18, shadow_radiances, shadow_radiance)
-/// Product of the mirror coefficients on each pixel sample's way.
-STORAGE_BUFFER(19, vec4, throughput)
+FETCH_VIEW(19, shadow_radiances, shadow_radiance)
+/// What is left on each pixel sample's way of what arrives at its end; w = Way, see way.glsl.
+STORAGE_BUFFER(20, vec4, throughput)
 /// The same, to be read.
-FETCH_VIEW(20, throughputs, throughput)
+FETCH_VIEW(21, throughputs, throughput)
 /// Radiance of each pixel sample in flight, alpha = coverage.
-STORAGE_BUFFER(21, vec4, radiance)
+STORAGE_BUFFER(22, vec4, radiance)
 /// The same, to be read; what another thread of the same pass adds is not seen.
-FETCH_VIEW(22, radiances, radiance)
+FETCH_VIEW(23, radiances, radiance)
 /// Sum, at the end mean, of each pixel's samples in the band.
-STORAGE_BUFFER(23, vec4, film)
+STORAGE_BUFFER(24, vec4, film)
 /// The same, to be read.
-FETCH_VIEW(24, film_so_far, film)
+FETCH_VIEW(25, film_so_far, film)
 /// What rounding took from each pixel's sum, with the sum of the weights.
-STORAGE_BUFFER(25, vec4, film_rest)
+STORAGE_BUFFER(26, vec4, film_rest)
 /// The same, to be read.
-FETCH_VIEW(26, film_rest_so_far, film_rest)
+FETCH_VIEW(27, film_rest_so_far, film_rest)
 /// Offsets from the pixel's centre at which FILTER_STEPS equal parts of a filter's weight end: this one's and the next one's.
-FETCH_BUFFER(27, filter_steps)
-/// Tracing again subtree by subtree: what each ray in the retrace queue has hit so far, two texels.
-STORAGE_BUFFER(28, uvec4, partial_hits)
+FETCH_BUFFER(28, filter_steps)
+/// Tracing again subtree by subtree: what each ray in the retrace queue has hit so far, three texels.
+STORAGE_BUFFER(29, uvec4, partial_hits)
 
 PUSH_CONSTANTS(Step, step_now)

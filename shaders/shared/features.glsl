@@ -27,12 +27,20 @@ layout(constant_id = 10) const bool SOBOL = true;
 layout(constant_id = 11) const bool INDEPENDENT = true;
 /// Samples are spread as a filter says, not evenly over the pixel.
 layout(constant_id = 12) const bool FILTER = true;
+/// Some material has a texture.
+layout(constant_id = 13) const bool TEXTURES = true;
+/// Some material has a normal map.
+layout(constant_id = 14) const bool NORMAL_MAPS = true;
+/// Some triangles are not opaque: traversal looks at alpha.
+layout(constant_id = 15) const bool ALPHA = true;
+/// Some surfaces let light through: rays go on behind them.
+layout(constant_id = 16) const bool LAYERS = true;
 
 // Safeguards switched off, one by one, to see what they prevent. Never on in a picture.
 
 /// Rays start a fixed distance off the surface.
-layout(constant_id = 13) const bool FIXED_EPSILON = false;
+layout(constant_id = 17) const bool FIXED_EPSILON = false;
 /// Triangles are tested as Möller and Trumbore do, which lets rays slip through between them.
-layout(constant_id = 14) const bool MOLLER_TRUMBORE = false;
+layout(constant_id = 18) const bool MOLLER_TRUMBORE = false;
 /// Samples are added up without compensation.
-layout(constant_id = 15) const bool PLAIN_SUMS = false;
+layout(constant_id = 19) const bool PLAIN_SUMS = false;

@@ -29,6 +29,8 @@ struct Hit {
     /// Whether its back is hit, then what it looks like, as a number: decides before both, so that the order of the file never shows, and
     /// of a thing as thin as paper the side that faces the ray is seen.
     uint precedence;
+    /// What is left of light that came through surfaces that are not opaque; for rays that any hit will do.
+    vec3 passed;
 };
 
 /// A ray prepared for the triangle test. Axes are rotated so that z is the direction's largest component.
@@ -99,8 +101,21 @@ float exact_edge_function(vec2 p, vec2 q) {
     return area;
 }
 
-/// Takes the triangle as the new hit if it is nearer than the old one. A ray for which that cannot be decided is `uncertain`.
-bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool culls, inout Hit hit, inout bool uncertain) {
+/// Less than this part of light is none.
+const float NO_LIGHT = 1.0 / 4096.0;
+
+/// Whether a ray ends at a triangle that is not opaque. Light is weakened where it does not.
+bool is_met(uint primitive, uint word, vec2 barycentrics, bool any, inout Hit hit) {
+    Veil veil = veil_at(primitive, word, barycentrics);
+    if (!any)
+        return veil.alpha > 0.0;
+    hit.passed *= light_through(veil);
+    return max(hit.passed.r, max(hit.passed.g, hit.passed.b)) < NO_LIGHT;
+}
+
+/// Takes the triangle as the new hit if it is nearer than the old one. Where `any` hit will do, backs count too. A ray for which that cannot
+/// be decided is `uncertain`.
+bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool any, inout Hit hit, inout bool uncertain) {
     uint first = triangle * TRIANGLE_TEXELS;
     uvec4 texel_a = FETCH(triangles, first);
     uvec4 texel_b = FETCH(triangles, first + 1u);
@@ -142,13 +157,16 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool culls
 #endif
     // det and 1/z have the same sign when the ray meets the front face.
     bool is_back = (det < 0.0) != (ray.shear.z < 0.0);
-    bool culled = culls && (texel_b.w & TRIANGLE_SINGLE_SIDED) != 0u && is_back;
+    bool culled = SINGLE_SIDED && !any && (texel_b.w & TRIANGLE_SINGLE_SIDED) != 0u && is_back;
     bool comes_first = INSTANCES && instance != hit.instance ? instance < hit.instance : texel_a.w < hit.primitive;
     uint precedence = texel_c.w | (is_back ? PRECEDENCE_BACK : 0u);
     bool is_first = precedence != hit.precedence ? precedence < hit.precedence : comes_first;
     bool nearer = t < hit.t || (t == hit.t && is_first);
     if (inside && det != 0.0 && t > 0.0 && nearer && !culled) {
-        hit = Hit(t, triangle, texel_a.w, vec2(v, w) / det, instance, precedence);
+        vec2 barycentrics = vec2(v, w) / det;
+        if (ALPHA && (texel_b.w & TRIANGLE_SEE_THROUGH) != 0u && !is_met(texel_a.w, texel_b.w, barycentrics, any, hit))
+            return false;
+        hit = Hit(t, triangle, texel_a.w, barycentrics, instance, precedence, hit.passed);
         return true;
     }
     return false;

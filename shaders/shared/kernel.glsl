@@ -15,6 +15,10 @@
 #define INSTANCES false
 #define RETRACE false
 #define MOLLER_TRUMBORE false
+#define TEXTURES false
+#define NORMAL_MAPS false
+#define ALPHA false
+#define LAYERS false
 #endif
 #include "bindings.glsl"
 layout(local_size_x = WORKGROUP) in;

@@ -16,10 +16,14 @@ const uint MAX_LEAF_TRIANGLES = 14u;
 const uint LEAF_IS_INSTANCE = 15u;
 /// Texels (16 bytes) in one tree node: a record for each of its two children.
 const uint NODE_TEXELS = 2u;
-/// Texels in one triangle of the traversal, and in one triangle's normals or colours.
+/// Texels in one triangle of the traversal, and in one triangle's normals, colours, texture coordinates or tangents.
 const uint TRIANGLE_TEXELS = 3u;
-/// Texels in a Material.
-const uint MATERIAL_TEXELS = 6u;
+/// Texels in a Material and the Look behind it.
+const uint MATERIAL_TEXELS = 12u;
+/// The first of a Look's among them.
+const uint LOOK_TEXEL = 6u;
+/// Texels in a Texture.
+const uint TEXTURE_TEXELS = 7u;
 /// Texels in a Light.
 const uint LIGHT_TEXELS = 4u;
 /// Texels in an Instance.
@@ -30,7 +34,9 @@ const uint ITEM_TEXELS = 2u;
 /// Added to the precedence of a triangle whose back is hit; its own is below.
 const uint PRECEDENCE_BACK = 0x80000000u;
 /// Bits of a triangle's material word below its flags.
-const uint MATERIAL_BITS = 29u;
+const uint MATERIAL_BITS = 28u;
+/// Triangle flag: it is not opaque everywhere.
+const uint TRIANGLE_SEE_THROUGH = 0x10000000u;
 /// Triangle flag: only the front face (counter-clockwise) is seen by camera and reflection rays.
 const uint TRIANGLE_SINGLE_SIDED = 0x20000000u;
 /// Triangle flag: it has vertex normals.
@@ -68,6 +74,45 @@ const uint LIGHT_POINT = 0u;
 const uint LIGHT_SPOT = 1u;
 /// Light kind: parallel light from infinitely far.
 const uint LIGHT_DIRECTIONAL = 2u;
+
+/// Radiance that reaches a surface from everywhere, as a share of its base colour.
+const float AMBIENT_SHARE = 0.15;
+/// Roughness from which on nothing is mirrored.
+const float MIRROR_END_ROUGHNESS = 0.5;
+
+/// Alpha mode: opaque.
+const uint ALPHA_OPAQUE = 0u;
+/// Alpha mode: there, or not there.
+const uint ALPHA_MASK = 1u;
+/// Alpha mode: the share that is there.
+const uint ALPHA_BLEND = 2u;
+/// Most surfaces that a ray goes through, one behind the other; what is behind the last one is taken for the background.
+const uint MAX_LAYERS = 32u;
+
+/// Bits of Texture.flags: how it goes on beyond its left and right edges.
+const uint TEXTURE_WRAP_U = 3u;
+/// Beyond its upper and lower edges, two bits further.
+const uint TEXTURE_WRAP_V = 12u;
+/// Value of those bits: turned round. 0 is repeated.
+const uint WRAP_MIRROR = 1u;
+/// Value of those bits: its outermost pixels.
+const uint WRAP_CLAMP = 2u;
+/// The nearest pixel where pixels are large.
+const uint TEXTURE_MAGNIFY_NEAREST = 0x10u;
+/// The nearest pixel where pixels are small.
+const uint TEXTURE_MINIFY_NEAREST = 0x20u;
+/// It has a mipmap.
+const uint TEXTURE_MIPMAP = 0x40u;
+/// The nearest level of the mipmap.
+const uint TEXTURE_LEVEL_NEAREST = 0x80u;
+/// Colours are sRGB.
+const uint TEXTURE_SRGB = 0x100u;
+/// 16 bits a channel, two pixels a texel; otherwise 8 and four.
+const uint TEXTURE_WIDE = 0x200u;
+/// It is placed by the second set of texture coordinates.
+const uint TEXTURE_SECOND_SET = 0x400u;
+/// Most places along a footprint that are read.
+const uint MAX_PROBES = 8u;
 
 /// Distance that stands for infinity, in world units.
 const float FAR = 1e30;
@@ -115,6 +160,16 @@ struct Frame {
     float filter_mean;
     /// How far off surfaces rays start where FIXED_EPSILON is on.
     float fixed_epsilon;
+    /// First texel of the attributes that are vertex colours; normals start at 0.
+    uint first_color;
+    /// First texel of those that are texture coordinates.
+    uint first_texcoord;
+    /// First texel of those that are tangents.
+    uint first_tangent;
+    /// Reflections one after the other.
+    uint max_depth;
+    /// Diameter of a sample's part of the picture where its ray starts, and how much it grows with the ray's length.
+    vec2 cone;
 };
 
 /// What changes from dispatch to dispatch: push constants.
@@ -131,12 +186,12 @@ struct Step {
     uint light;
     /// shade: 1 when this dispatch adds what needs no light (the first light's).
     uint first_light;
-    /// shade: 1 when this dispatch makes reflected rays (the last light's, while mirrors may still reflect).
+    /// shade: 1 when this dispatch makes rays that go on (the last light's, while there is another round).
     uint reflect;
     /// prepare: bit q set = queue q has been filled and is to be worked on.
     uint queues;
-    /// shade: 1 after the first reflection, when samples have a throughput.
-    uint reflected;
+    /// shade: number of the round; from 1 on samples have a throughput.
+    uint round;
     /// resolve: 1 = divide by the number of samples, the band is complete.
     uint finish;
     /// Chooses between sequences of sample positions.
@@ -171,6 +226,78 @@ struct Material {
     vec3 mirror_tinted;
     /// Fills the texel.
     vec2 unused;
+};
+
+/// What a material's coefficients come from, for places where textures change them, and what its alpha means. Whole texels.
+struct Look {
+    /// Base colour, linear.
+    vec3 base_color;
+    /// Alpha.
+    float alpha;
+    /// 0 dielectric … 1 metal.
+    float metallic;
+    /// 0 smooth … 1 rough.
+    float roughness;
+    /// How much the occlusion map darkens ambient light.
+    float occlusion_strength;
+    /// How far the normal map bends normals.
+    float normal_scale;
+    /// Reflectance of a dielectric seen head-on.
+    vec3 dielectric;
+    /// Alpha from which on a masked surface is there.
+    float cutoff;
+    /// Textures, 0 for none, or one more than its place: base colour and alpha.
+    uint base_color_map;
+    /// Roughness in green, metallic in blue.
+    uint metallic_roughness_map;
+    /// Normals.
+    uint normal_map;
+    /// Ambient light in red.
+    uint occlusion_map;
+    /// Emission.
+    uint emission_map;
+    /// Strength of a dielectric's reflection in alpha.
+    uint specular_map;
+    /// Its colour.
+    uint specular_color_map;
+    /// Transmission in red.
+    uint transmission_map;
+    /// Share of light that passes.
+    float transmission;
+    /// ALPHA_OPAQUE, ALPHA_MASK or ALPHA_BLEND.
+    uint alpha_mode;
+    /// 1: the coefficients follow from the factors here; 0: they are as they are, but for the base colour map, which is a tint.
+    uint follows_rule;
+    /// Fills the texel.
+    uint unused;
+};
+
+/// A texture in one of its uses. Whole texels.
+struct Texture {
+    /// Pixels across.
+    uint width;
+    /// Pixels down.
+    uint height;
+    /// Levels of the mipmap.
+    uint levels;
+    /// TEXTURE_ flags.
+    uint flags;
+    /// Row of the affine matrix from texture coordinates to the texture's own.
+    vec3 u_from_texcoord;
+    /// Fills the texel.
+    uint unused_u;
+    /// Second row.
+    vec3 v_from_texcoord;
+    /// Fills the texel.
+    uint unused_v;
+    /// First texel of level 0 to 3.
+    uvec4 levels_from_0;
+    /// First texel of level 4 to 7.
+    uvec4 levels_from_4;
+    /// First texel of level 8 to 11.
+    uvec4 levels_from_8;
+    /// First texel of level 12 to 15.
+    uvec4 levels_from_12;
 };
 
 /// A light (KHR_lights_punctual). Whole texels.

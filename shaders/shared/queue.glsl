@@ -40,3 +40,9 @@ uint queue_item(uint index, uint queue) {
 void add_radiance(uint sample_index, vec3 added) {
     radiance[sample_index].rgb = FETCH_FLOATS(radiances, sample_index).rgb + added;
 }
+
+/// Adds to a pixel sample's alpha: of what is still clear, the share that something covers.
+void add_coverage(uint sample_index, float covered) {
+    float before = FETCH_FLOATS(radiances, sample_index).a;
+    radiance[sample_index].a = before + (1.0 - before) * covered;
+}

@@ -8,9 +8,17 @@ struct Surface {
     vec3 geometric_normal;
     /// Unit interpolated normal, on the same side.
     vec3 normal;
-    /// Vertex colour.
+    /// Vertex colour, and base colour map if there is one.
     vec3 tint;
+    /// Where on the triangle, and how much of it is seen.
+    Place place;
     uint material;
+    /// The triangle's material and flags.
+    uint word;
+    /// It is not opaque everywhere.
+    bool is_see_through;
+    /// Its normal comes from a normal map.
+    bool is_bent;
     /// From position to where shadow rays start: on the curved surface that the vertex normals stand for.
     vec3 bulge;
     /// From position to where it is at least four times the error inside every edge: what rounding put beyond an edge, and so behind the
@@ -18,8 +26,10 @@ struct Surface {
     vec3 inward;
 };
 
-vec3 interpolate(vec3 weights, uvec4 a, uvec4 b, uvec4 c) {
-    return weights.x * uintBitsToFloat(a.xyz) + weights.y * uintBitsToFloat(b.xyz) + weights.z * uintBitsToFloat(c.xyz);
+/// The mean of a triangle's attributes, which start here.
+vec4 interpolate(uint first, vec3 weights) {
+    return weights.x * FETCH_FLOATS(attributes, first) + weights.y * FETCH_FLOATS(attributes, first + 1u) +
+           weights.z * FETCH_FLOATS(attributes, first + 2u);
 }
 
 /// The linear part of an instance's transform to the world, column by column.
@@ -72,7 +82,45 @@ vec3 rise(vec3 from_corner, vec3 normal) {
     return -min(dot(from_corner, normal), 0.0) * normal;
 }
 
-Surface surface_at(HitItem item) {
+/// What a cone of this diameter covers of a triangle: the axes of an ellipse, as changes of its barycentric coordinates (as in Akenine-Möller et
+/// al., JCGT 10(1) 2021).
+void cover(vec3 edge_b, vec3 edge_c, vec3 normal, vec3 direction, float diameter, inout Place place) {
+    float cosine = max(abs(dot(normal, direction)), 1e-3);
+    vec3 along = direction - dot(normal, direction) * normal;
+    vec3 other = abs(normal.x) < 0.5 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
+    along = normalize(dot(along, along) > 1e-12 ? along : cross(normal, other));
+    // Edges of about size 1, so that no product vanishes.
+    float size = magnitude_of(max(abs(edge_b), abs(edge_c)));
+    vec3 b = edge_b / size;
+    vec3 c = edge_c / size;
+    vec3 across = cross(b, c);
+    float scale = 1.0 / (size * max(dot(across, across), 1e-30));
+    mat2x3 gradients = mat2x3(cross(c, across) * scale, cross(across, b) * scale);
+    place.major = (along * (diameter / cosine)) * gradients;
+    place.minor = (cross(normal, along) * diameter) * gradients;
+}
+
+/// The normal that a normal map says, from one that is interpolated; both on the front.
+vec3 mapped_normal(HitItem item, Surface surface, Look look, vec3 weights, vec3 normal, bool is_placed) {
+    vec4 interpolated = interpolate(frame.first_tangent + surface.place.primitive * TRIANGLE_TEXELS, weights);
+    vec3 tangent = interpolated.xyz;
+    float handedness = interpolated.w < 0.0 ? -1.0 : 1.0;
+    if (is_placed) {
+        mat3 to_world = world_from_part(item.instance);
+        tangent = to_world * tangent;
+        handedness *= dot(cross(to_world[0], to_world[1]), to_world[2]) < 0.0 ? -1.0 : 1.0;
+    }
+    tangent -= dot(tangent, normal) * normal;
+    float size = length(tangent);
+    vec3 local = map_at(look.normal_map, surface.place).xyz * 2.0 - 1.0;
+    local.xy *= look.normal_scale;
+    tangent /= size;
+    vec3 mapped = local.x * tangent + local.y * handedness * cross(normal, tangent) + local.z * normal;
+    return size > 0.0 && dot(mapped, mapped) > 0.0 ? normalize(mapped) : normal;
+}
+
+/// The surface that was hit; the cone of the ray had this length when it arrived, or, where it comes from the eye, any.
+Surface surface_at(HitItem item, float cone_length, bool from_eye) {
     uint first = item.triangle * TRIANGLE_TEXELS;
     uvec4 texel_a = FETCH(triangles, first);
     uvec4 texel_b = FETCH(triangles, first + 1u);
@@ -81,7 +129,7 @@ Surface surface_at(HitItem item) {
     vec3 b = uintBitsToFloat(texel_b.xyz);
     vec3 c = uintBitsToFloat(texel_c.xyz);
     vec3 weights = vec3(1.0 - item.barycentrics.x - item.barycentrics.y, item.barycentrics);
-    uint attributes = texel_a.w * TRIANGLE_TEXELS;
+    uint first_attribute = texel_a.w * TRIANGLE_TEXELS;
     uint flags = texel_b.w;
 
     Surface surface;
@@ -110,9 +158,9 @@ Surface surface_at(HitItem item) {
     surface.normal = surface.geometric_normal;
     surface.bulge = vec3(0.0);
     if (SMOOTH_NORMALS && (flags & TRIANGLE_SMOOTH) != 0u) {
-        vec3 na = FETCH_FLOATS(normals, attributes).xyz;
-        vec3 nb = FETCH_FLOATS(normals, attributes + 1u).xyz;
-        vec3 nc = FETCH_FLOATS(normals, attributes + 2u).xyz;
+        vec3 na = FETCH_FLOATS(attributes, first_attribute).xyz;
+        vec3 nb = FETCH_FLOATS(attributes, first_attribute + 1u).xyz;
+        vec3 nc = FETCH_FLOATS(attributes, first_attribute + 2u).xyz;
         if (is_placed) {
             // Unit in the world before they are interpolated, as in a flat scene, where the host sees to it.
             na = normalize(world_normal(item.instance, na));
@@ -127,15 +175,30 @@ Surface surface_at(HitItem item) {
                         weights.y * rise(to_world * (point - b), front * nb) +
                         weights.z * rise(to_world * (point - c), front * nc);
     }
+    surface.material = bitfieldExtract(texel_b.w, 0, int(MATERIAL_BITS));
+    surface.word = flags;
+    surface.is_see_through = (flags & TRIANGLE_SEE_THROUGH) != 0u;
+    surface.place = Place(texel_a.w, item.barycentrics, vec2(0.0), vec2(0.0));
+    if (TEXTURES) {
+        mat3 to_world = is_placed ? world_from_part(item.instance) : mat3(1.0);
+        float length_so_far = from_eye ? distance(surface.position, frame.eye) : cone_length;
+        float diameter = frame.cone.x + frame.cone.y * length_so_far;
+        cover(to_world * edge_b, to_world * edge_c, surface.geometric_normal, item.direction, diameter, surface.place);
+    }
+    surface.is_bent = false;
+    if (TEXTURES && NORMAL_MAPS) {
+        Look look = look_at(surface.material);
+        surface.is_bent = look.normal_map != 0u;
+        if (surface.is_bent)
+            surface.normal = mapped_normal(item, surface, look, weights, surface.normal, is_placed);
+    }
     if (dot(surface.geometric_normal, item.direction) > 0.0) {
         surface.geometric_normal = -surface.geometric_normal;
         surface.normal = -surface.normal;
     }
     surface.tint = vec3(1.0);
     if (VERTEX_COLORS && (flags & TRIANGLE_COLORED) != 0u)
-        surface.tint = interpolate(weights, FETCH(colors, attributes), FETCH(colors, attributes + 1u),
-                                   FETCH(colors, attributes + 2u));
-    surface.material = bitfieldExtract(texel_b.w, 0, int(MATERIAL_BITS));
+        surface.tint = interpolate(frame.first_color + first_attribute, weights).rgb;
     return surface;
 }
 

@@ -21,6 +21,17 @@ Material material_at(uint index) {
     return Material(a.xyz, a.w, b.xyz, vec3(b.w, c.xy), vec3(c.zw, d.x), d.yzw, e.xyz, vec3(e.w, f.xy), f.zw);
 }
 
+Look look_at(uint index) {
+    uint first = index * MATERIAL_TEXELS + LOOK_TEXEL;
+    vec4 a = FETCH_FLOATS(materials, first);
+    vec4 b = FETCH_FLOATS(materials, first + 1u);
+    vec4 c = FETCH_FLOATS(materials, first + 2u);
+    uvec4 d = FETCH(materials, first + 3u);
+    uvec4 e = FETCH(materials, first + 4u);
+    uvec4 f = FETCH(materials, first + 5u);
+    return Look(a.xyz, a.w, b.x, b.y, b.z, b.w, c.xyz, c.w, d.x, d.y, d.z, d.w, e.x, e.y, e.z, e.w, uintBitsToFloat(f.x), f.y, f.z, f.w);
+}
+
 Light light_of(uint index) {
     uint first = index * LIGHT_TEXELS;
     vec4 a = FETCH_FLOATS(lights, first);

@@ -107,8 +107,7 @@ bool visit_leaf(inout Walk walk, int leaf, bool any, inout Hit hit) {
     uint end = triangle + (reference & 15u);
     bool found = false;
     while (triangle < end && triangle != uint(IMPOSSIBLE)) {
-        found = intersect_triangle(walk.ray, triangle, walk.instance, SINGLE_SIDED && !any, hit,
-                                   walk.uncertain) || found;
+        found = intersect_triangle(walk.ray, triangle, walk.instance, any, hit, walk.uncertain) || found;
         triangle++;
     }
     walk.cut = walk.cut || triangle < end;
@@ -229,19 +228,21 @@ bool traverse(Ray world_ray, bool any, inout Hit hit) {
 
 /// No hit yet, and none wanted beyond `distance`.
 Hit no_hit(float distance) {
-    return Hit(distance, NO_TRIANGLE, NO_TRIANGLE, vec2(0.0), 0u, NO_TRIANGLE);
+    return Hit(distance, NO_TRIANGLE, NO_TRIANGLE, vec2(0.0), 0u, NO_TRIANGLE, vec3(1.0));
 }
 
 /// What a ray that is traced again has hit in the subtrees before, or no hit yet. `index` is its place in the retrace queue.
 Hit hit_so_far(uint index, float distance) {
     Hit hit = no_hit(distance);
     if (RETRACE) {
-        uvec4 first = partial_hits[2u * index];
+        uvec4 first = partial_hits[3u * index];
         uint triangle = step_now.first_part != 0u ? NO_TRIANGLE : first.y;
+        vec3 passed = uintBitsToFloat(partial_hits[3u * index + 2u].xyz);
+        hit.passed = mix(passed, vec3(1.0), bvec3(step_now.first_part != 0u));
         if (triangle != NO_TRIANGLE)
             hit = Hit(uintBitsToFloat(first.x), triangle, FETCH(triangles, triangle * TRIANGLE_TEXELS).w,
-                      uintBitsToFloat(first.zw), partial_hits[2u * index + 1u].x,
-                      partial_hits[2u * index + 1u].y);
+                      uintBitsToFloat(first.zw), partial_hits[3u * index + 1u].x, partial_hits[3u * index + 1u].y,
+                      hit.passed);
     }
     return hit;
 }
@@ -250,8 +251,9 @@ Hit hit_so_far(uint index, float distance) {
 bool is_last_part(uint index, Hit hit) {
     if (!RETRACE)
         return true;
-    partial_hits[2u * index] = uvec4(floatBitsToUint(hit.t), hit.triangle, floatBitsToUint(hit.barycentrics));
-    partial_hits[2u * index + 1u] = uvec4(hit.instance, hit.precedence, 0u, 0u);
+    partial_hits[3u * index] = uvec4(floatBitsToUint(hit.t), hit.triangle, floatBitsToUint(hit.barycentrics));
+    partial_hits[3u * index + 1u] = uvec4(hit.instance, hit.precedence, 0u, 0u);
+    partial_hits[3u * index + 2u] = uvec4(floatBitsToUint(hit.passed), 0u);
     // A condition of the whole dispatch, made one of this thread: see kernel.glsl.
     return all(bvec2(step_now.last_part != 0u, index != NO_ITEM));
 }

@@ -41,9 +41,9 @@ impl ExplainArgs {
         let options = self.view.options()?;
         let prepared = Prepared::new(&scene, &options)?;
         let tree = prepared.tree(&options);
-        let Prepared { soup, view, features } = prepared;
-        let (features, size) = (tree.features(features), tree.size());
-        let plan = Plan::new(&scene, &soup, &view, features, size, options.samples_in_flight);
+        let (features, size) = (tree.features(prepared.features), tree.size());
+        let plan = Plan::new(&prepared, &scene, features, size, options.samples_in_flight)?;
+        let view = &prepared.view;
         match if self.json { Form::Json } else { self.format } {
             Form::Text => Ok(Outcome::text(text(&plan, &scene.name, view.samples))),
             Form::Mermaid => Ok(Outcome::text(mermaid(&plan))),
@@ -99,7 +99,7 @@ fn text(plan: &Plan, name: &str, samples: u32) -> String {
 
 /// Passes as boxes, queues as the arrows between them.
 fn mermaid(plan: &Plan) -> String {
-    let (shadows, reflections) = (plan.features.shadows, plan.features.reflections);
+    let (shadows, goes_on) = (plan.features.shadows, plan.features.rays_go_on());
     let mut lines = vec![
         "flowchart LR".to_owned(),
         "  scene[(nodes, triangles)] --> primary".to_owned(),
@@ -111,7 +111,7 @@ fn mermaid(plan: &Plan) -> String {
         lines.push("  shade -- shadow_queue --> shadow".into());
         lines.push("  shadow -- visible light --> resolve".into());
     }
-    if reflections {
+    if goes_on {
         lines.push("  shade -- reflection_queue --> reflection".into());
         lines.push(format!("  reflection -- hit_queue, {} times --> shade", plan.rounds - 1));
         lines.push("  reflection -- background --> resolve".into());

@@ -19,6 +19,11 @@ mod generated_features {
 pub use generated_features::Features;
 
 impl Features {
+    /// Rays go on after a hit: reflected, or behind a surface.
+    pub fn rays_go_on(&self) -> bool {
+        self.reflections || self.layers
+    }
+
     /// Names and values of what a scene may need: all but the variant of a kernel and safeguards that are off.
     pub fn needs(&self) -> impl Iterator<Item = (&'static str, bool)> {
         const OTHERS: [&str; 4] = ["retrace", "fixed_epsilon", "moller_trumbore", "plain_sums"];
@@ -76,7 +81,7 @@ pub struct KernelCode {
 /// SPIR-V of a kernel in two variants.
 #[derive(Clone, Copy, Debug)]
 pub struct SpirV {
-    /// Without instances, tracing again and other triangle tests, whatever its specialization constants say.
+    /// Without instances, textures, alpha, tracing again and other triangle tests, whatever its specialization constants say.
     pub plain: &'static [u8],
     /// With everything.
     pub full: &'static [u8],
@@ -85,7 +90,8 @@ pub struct SpirV {
 impl SpirV {
     /// The smallest variant that has these features.
     pub fn with(&self, features: Features) -> &'static [u8] {
-        if features.instances || features.retrace || features.moller_trumbore {
+        let Features { instances, retrace, moller_trumbore, textures, alpha, layers, .. } = features;
+        if instances || retrace || moller_trumbore || textures || alpha || layers {
             self.full
         } else {
             self.plain

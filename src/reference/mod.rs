@@ -5,6 +5,8 @@
 //! written down again from their sources.
 
 mod sampling;
+mod surface;
+mod texture;
 mod verdict;
 
 pub use verdict::allows;
@@ -32,7 +34,8 @@ pub fn render(
 ) -> Result<Film> {
     let precedence = precedence(scene, soup);
     let spread = sampling::Spread::new(view);
-    let tracer = Tracer { scene, soup, view, spread, precedence, scale: (soup.hi - soup.lo).length().max(1e-30) };
+    let (library, scale) = (texture::Library::new(scene), (soup.hi - soup.lo).length().max(1e-30));
+    let tracer = Tracer { scene, soup, view, spread, precedence, library, scale };
     let mut film = Film::new(view.width, view.height, view.background == Background::Transparent);
     let done = AtomicU64::new(0);
     film.pixels.par_chunks_mut(view.width as usize).enumerate().try_for_each(|(y, row)| {
@@ -57,6 +60,7 @@ struct Tracer<'a> {
     spread: sampling::Spread,
     /// Which of several hits at the same distance is seen.
     precedence: Vec<u32>,
+    library: texture::Library<'a>,
     /// Size of the scene, to which offsets are relative.
     scale: f64,
 }
@@ -75,6 +79,30 @@ struct Hit {
     barycentrics: (f64, f64),
 }
 
+impl Hit {
+    /// λ1, λ2, λ3.
+    fn weights(&self) -> [f64; 3] {
+        weights_of(self.barycentrics)
+    }
+}
+
+fn weights_of((u, v): (f64, f64)) -> [f64; 3] {
+    [1.0 - u - v, u, v]
+}
+
+/// Most surfaces that are seen through one behind the other.
+const LAYERS: u32 = 32;
+/// Less than this share of light is none.
+const NO_LIGHT: f64 = 1.0 / 4096.0;
+
+/// What a ray has behind it.
+#[derive(Clone, Copy, Default)]
+struct Way {
+    travelled: f64,
+    mirrors: u32,
+    layers: u32,
+}
+
 impl Tracer<'_> {
     fn pixel(&self, x: u32, y: u32) -> [f32; 4] {
         let view = self.view;
@@ -87,16 +115,9 @@ impl Tracer<'_> {
             };
             weights += weight;
             let ray = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy);
-            match self.nearest(&ray) {
-                Some(hit) => {
-                    color += weight * self.shade(&ray, &hit, 0);
-                    alpha += weight;
-                }
-                None => {
-                    color += weight * view.background.radiance(ray.direction);
-                    alpha += weight * view.background.alpha();
-                }
-            }
+            let (radiance, coverage) = self.seen(&ray, Way::default());
+            color += weight * radiance;
+            alpha += weight * coverage;
         }
         let expected = f64::from(view.samples) * self.spread.mean_weight;
         let divisor = if weights > 0.5 * expected { weights } else { expected };
@@ -145,51 +166,49 @@ impl Tracer<'_> {
                     || (t == hit.t
                         && (!front, self.precedence[primitive]) < (!hit.front, self.precedence[hit.primitive]))
             };
-            if seen && nearest.as_ref().is_none_or(before) {
+            let is_there =
+                || !self.soup.flags[primitive].see_through || self.veil(primitive, weights_of((u, v))).alpha > 0.0;
+            if seen && nearest.as_ref().is_none_or(before) && is_there() {
                 nearest = Some(Hit { t, primitive, front, barycentrics: (u, v) });
             }
         }
         nearest
     }
 
-    /// Something, front or back, lies on the ray closer than `distance`.
-    fn blocked(&self, ray: &Ray, distance: f64) -> bool {
-        (0..self.soup.len()).any(|primitive| self.intersect(ray, primitive).is_some_and(|(_, _, t, _)| t < distance))
-    }
-
-    /// Ambient + emission + lights + mirror, as seen along the ray.
-    fn shade(&self, ray: &Ray, hit: &Hit, depth: u32) -> DVec3 {
-        let primitive = hit.primitive;
-        let [a, b, c] = self.soup.positions[primitive];
-        let (u, v) = hit.barycentrics;
-        let weights = [1.0 - u - v, u, v];
-        let point = a * weights[0] + b * weights[1] + c * weights[2];
-        let mut plane_normal = (b - a).normalize().cross((c - a).normalize()).normalize();
-        let mut normal = plane_normal;
-        let front = if plane_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
-        // Where shadow rays start: the mean of the point's projections onto the planes of the corners' normals, as far as
-        // it lies below them (Hanika, Ray Tracing Gems II, ch. 4).
-        let mut raised = point;
-        if self.soup.flags[primitive].smooth {
-            let corners = self.soup.normals[primitive];
-            normal = (0..3).map(|i| corners[i].as_dvec3() * weights[i]).sum::<DVec3>().normalize();
-            for (corner, position) in [a, b, c].into_iter().enumerate() {
-                let upward = corners[corner].as_dvec3() * front;
-                raised -= upward * (weights[corner] * (point - position).dot(upward).min(0.0));
+    /// What of light comes through all that lies on the ray closer than `distance`, fronts and backs.
+    fn passed(&self, ray: &Ray, distance: f64) -> DVec3 {
+        let mut passed = DVec3::ONE;
+        for primitive in 0..self.soup.len() {
+            let Some((u, v, _, _)) = self.intersect(ray, primitive).filter(|(_, _, t, _)| *t < distance) else {
+                continue;
+            };
+            if !self.soup.flags[primitive].see_through {
+                return DVec3::ZERO;
+            }
+            let veil = self.veil(primitive, weights_of((u, v)));
+            let clear = 1.0 - veil.alpha;
+            let stained = DVec3::ONE * clear + veil.color * veil.alpha;
+            passed *= clear * stained + veil.alpha * veil.transmission * veil.color;
+            if passed.max_element() < NO_LIGHT {
+                return DVec3::ZERO;
             }
         }
-        if plane_normal.dot(ray.direction) > 0.0 {
-            plane_normal = -plane_normal;
-            normal = -normal;
+        passed
+    }
+
+    /// Radiance and coverage along a ray.
+    fn seen(&self, ray: &Ray, way: Way) -> (DVec3, f64) {
+        match self.nearest(ray) {
+            Some(hit) => self.shade(ray, &hit, Way { travelled: way.travelled + hit.t, ..way }),
+            None => (self.view.background.radiance(ray.direction), self.view.background.alpha()),
         }
-        let tint = if self.soup.flags[primitive].colored {
-            let corners = self.soup.colors[primitive];
-            (0..3).map(|i| corners[i].as_dvec3() * weights[i]).sum()
-        } else {
-            DVec3::ONE
-        };
-        let material = &self.scene.materials[self.soup.materials[primitive] as usize];
-        let whitted = material.whitted(tint);
+    }
+
+    /// Ambient + emission + lights + mirror + what is behind, as seen along the ray, and how much of that is something.
+    fn shade(&self, ray: &Ray, hit: &Hit, way: Way) -> (DVec3, f64) {
+        let surface = self.surface(ray, hit, way.travelled);
+        let (point, plane_normal, normal) = (surface.point, surface.plane_normal, surface.normal);
+        let whitted = surface.material.whitted(surface.tint);
         // Far above f64's rounding, far below whatever can be seen.
         let off = 1e-10 * hit.t + 2e-15 * self.scale;
         let leave = |direction: DVec3| {
@@ -197,30 +216,56 @@ impl Tracer<'_> {
             Ray { origin: point + plane_normal * (side * off), direction }
         };
 
-        let from_curve = |direction: DVec3| Ray { origin: raised + plane_normal * off, direction };
-        let mut color = whitted.ambient + material.emission;
+        let from_curve = |direction: DVec3| Ray { origin: surface.raised + plane_normal * off, direction };
+        let mut color = whitted.ambient * surface.occlusion + surface.material.emission;
         let to_viewer = -ray.direction;
         for light in &self.view.lights {
             let (to_light, distance, irradiance) = arriving(light, point);
             let cosine = normal.dot(to_light);
-            if cosine <= 0.0 || irradiance == DVec3::ZERO || self.blocked(&from_curve(to_light), distance) {
+            if cosine <= 0.0 || irradiance == DVec3::ZERO {
+                continue;
+            }
+            let passed = self.passed(&from_curve(to_light), distance);
+            if passed == DVec3::ZERO {
                 continue;
             }
             let halfway = (to_light + to_viewer).normalize();
             let gloss = normal.dot(halfway).max(0.0).powf(whitted.shininess);
-            color += irradiance * (whitted.diffuse * cosine + whitted.specular * gloss);
+            color += irradiance * passed * (whitted.diffuse * cosine + whitted.specular * gloss);
         }
-        if depth < self.view.max_depth && whitted.mirror.max_element() > 0.0 {
-            // r = 2(n·v)n − v
-            let reflected = (normal * (2.0 * normal.dot(to_viewer)) - to_viewer).normalize();
-            let ray = leave(reflected);
-            let seen = match self.nearest(&ray) {
-                Some(hit) => self.shade(&ray, &hit, depth + 1),
-                None => self.view.background.radiance(reflected),
+        let (alpha, through) = if self.soup.flags[hit.primitive].see_through {
+            let veil = self.veil(hit.primitive, hit.weights());
+            (veil.alpha, DVec3::splat(1.0 - veil.alpha) + veil.color * (veil.alpha * veil.transmission))
+        } else {
+            (1.0, DVec3::ZERO)
+        };
+        if way.mirrors < self.view.max_depth && whitted.mirror.max_element() > 0.0 {
+            // r = 2(n·v)n − v, out of the surface.
+            let mut reflected = normal * (2.0 * normal.dot(to_viewer)) - to_viewer;
+            if self.scene.materials[self.soup.materials[hit.primitive] as usize].drawn_maps().normal.is_some() {
+                reflected -= plane_normal * (2.0 * reflected.dot(plane_normal).min(0.0));
+            }
+            let reflected = reflected.normalize();
+            let seen = if through.max_element() > 0.0 {
+                // A ray goes on one way only.
+                self.view.background.radiance(reflected)
+            } else {
+                self.seen(&leave(reflected), Way { mirrors: way.mirrors + 1, ..way }).0
             };
             color += whitted.mirror * seen;
         }
-        color
+        let mut coverage = alpha;
+        color *= alpha;
+        if through.max_element() > 0.0 {
+            let (behind, covered) = if way.layers < LAYERS {
+                self.seen(&leave(ray.direction), Way { layers: way.layers + 1, ..way })
+            } else {
+                (self.view.background.radiance(ray.direction), 0.0)
+            };
+            color += through * behind;
+            coverage += (1.0 - alpha) * covered;
+        }
+        (color, coverage)
     }
 }
 

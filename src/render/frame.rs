@@ -55,7 +55,7 @@ impl Tracers {
         Ok(Self {
             primary: kernel(&kernels::PRIMARY)?,
             shadow: features.shadows.then(|| kernel(&kernels::SHADOW)).transpose()?,
-            reflection: features.reflections.then(|| kernel(&kernels::REFLECTION)).transpose()?,
+            reflection: features.rays_go_on().then(|| kernel(&kernels::REFLECTION)).transpose()?,
         })
     }
 }
@@ -138,15 +138,17 @@ impl<'a> Frame<'a> {
         self.trace_again(commands, wave, |again| Some(&again.primary));
 
         for round in 0..rounds {
-            let may_reflect = reflection.is_some() && round + 1 < rounds;
+            let goes_on = reflection.is_some() && round + 1 < rounds;
             self.prepare(commands, &[QUEUE_HIT]);
             for light in 0..lights {
-                let reflect = may_reflect && light + 1 == lights;
+                // In the last round of layers, too: what is behind the last one is the background.
+                let is_last = light + 1 == lights;
+                let reflect = goes_on && is_last;
                 let step = Step {
                     light,
                     first_light: u32::from(light == 0),
-                    reflect: reflect.into(),
-                    reflected: u32::from(round > 0),
+                    reflect: (is_last && (goes_on || self.plan.features.layers)).into(),
+                    round,
                     ..wave
                 };
                 commands.dispatch_indirect(&self.shade, bytemuck::bytes_of(&step), arguments, QUEUE_HIT.into());
@@ -163,7 +165,7 @@ impl<'a> Frame<'a> {
                     commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
                 }
             }
-            if let (Some(reflection), true) = (reflection, may_reflect) {
+            if let (Some(reflection), true) = (reflection, goes_on) {
                 commands.dispatch_indirect(reflection, bytemuck::bytes_of(&wave), arguments, QUEUE_REFLECTION.into());
                 self.trace_again(commands, wave, |again| again.reflection.as_ref());
             }
@@ -239,7 +241,7 @@ impl<'a> Frame<'a> {
 
     /// Allocates what rays that are traced again keep between subtrees.
     fn make_partial_hits(&mut self) -> Result<()> {
-        let bytes = 2 * 16 * u64::from(self.plan.band_pixels) * u64::from(self.plan.wave_samples);
+        let bytes = 3 * 16 * u64::from(self.plan.band_pixels) * u64::from(self.plan.wave_samples);
         let slot = binding::PARTIAL_HITS;
         let made = upload::frame_buffer(self.renderer, slot, "partial hits", bytes)?;
         let old = self.buffers.insert(slot, made);

@@ -5,6 +5,7 @@ mod options;
 mod plan;
 mod progressive;
 pub mod ray_sets;
+mod textures;
 mod trace;
 mod tree;
 mod upload;
@@ -14,6 +15,7 @@ pub use plan::{LeftOut, Plan, PlannedBuffer, PlannedPass};
 pub use trace::{Met, Ray, Trace, Tracer};
 pub use tree::{Rebase, Tree, TreeSize};
 
+use crate::bvh::Quality;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{binding, BindingKind, Features, KernelCode, RayItem, Step};
@@ -90,7 +92,9 @@ impl Prepared {
         let Self { soup, view, .. } = self;
         let sabotage = |one| options.sabotage == Some(one);
         let rebase = if sabotage(Sabotage::NoRebase) { Rebase::NONE } else { Rebase::for_view(soup.lo, soup.hi, view) };
-        let mut tree = Tree::build(soup, rebase, options.quality(soup.len()));
+        // Light that passes a triangle must meet it once: none may lie in two leaves.
+        let quality = if self.features.layers { Quality::Fast } else { options.quality(soup.len()) };
+        let mut tree = Tree::build(soup, rebase, quality);
         tree.rounds_outward = !sabotage(Sabotage::TightBoxes);
         tree
     }
@@ -205,10 +209,12 @@ impl Renderer {
         let most = self.device.info.max_storage_bytes / size_of::<RayItem>() as u64;
         let in_flight = options.samples_in_flight.min(u32::try_from(most).unwrap_or(u32::MAX));
         progressive::check(options)?;
-        let plan = Plan::new(scene, soup, view, features, tree.size(), in_flight);
         let start = Instant::now();
+        let textures = textures::Textures::of(scene, features.textures)?;
+        let plan = Plan::with_textures(prepared, scene, features, tree.size(), in_flight, &textures);
         let device_tree = tree.for_device(soup, view.camera.eye);
-        let on_device = upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase };
+        let on_device =
+            upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase, textures: &textures };
         let mut frame = frame::Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts()))?;
         let upload = milliseconds(start);
         let start = Instant::now();

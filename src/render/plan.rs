@@ -1,10 +1,12 @@
 //! What a scene gets: features, passes, buffers; and what was left out and why. Computed without any device, and the only
 //! source from which the frame is recorded and buffers are allocated.
 
-use super::TreeSize;
+use super::textures::Textures;
+use super::{Prepared, TreeSize};
+use crate::error::Result;
 use crate::layout::{
-    Features, HitItem, Light, Material, RayItem, FILTER_STEPS, INSTANCE_TEXELS, NODE_TEXELS, TILE, TRIANGLE_TEXELS,
-    WORKGROUP,
+    Features, HitItem, Light, RayItem, Texture, FILTER_STEPS, INSTANCE_TEXELS, MATERIAL_TEXELS, MAX_LAYERS,
+    NODE_TEXELS, TILE, TRIANGLE_TEXELS, WORKGROUP,
 };
 use crate::scene::{Scene, Soup, View};
 
@@ -71,7 +73,23 @@ pub struct Plan {
 
 impl Plan {
     /// The plan for a view of a scene with a tree of this size.
-    pub fn new(scene: &Scene, soup: &Soup, view: &View, features: Features, tree: TreeSize, in_flight: u32) -> Self {
+    ///
+    /// # Errors
+    /// `Content` when its textures are too large.
+    pub fn new(prepared: &Prepared, scene: &Scene, features: Features, tree: TreeSize, in_flight: u32) -> Result<Self> {
+        let textures = Textures::of(scene, features.textures)?;
+        Ok(Self::with_textures(prepared, scene, features, tree, in_flight, &textures))
+    }
+
+    /// As [`Plan::new`], with textures that are ready for the device.
+    pub(super) fn with_textures(
+        Prepared { soup, view, .. }: &Prepared,
+        scene: &Scene,
+        features: Features,
+        tree: TreeSize,
+        in_flight: u32,
+        textures: &Textures,
+    ) -> Self {
         let tiles = u64::from(view.width.div_ceil(TILE)) * u64::from(view.height.div_ceil(TILE));
         let padded_pixels = tiles * u64::from(TILE * TILE);
         let in_flight = in_flight.clamp(WORKGROUP, MOST_IN_FLIGHT) / WORKGROUP * WORKGROUP;
@@ -84,14 +102,16 @@ impl Plan {
             padded_pixels,
             band_pixels,
             wave_samples,
-            rounds: if features.reflections { view.max_depth + 1 } else { 1 },
+            rounds: 1
+                + if features.reflections { view.max_depth } else { 0 }
+                + if features.layers { MAX_LAYERS } else { 0 },
             lights: if features.shadows { (view.lights.len() as u32).max(1) } else { 1 },
             passes: Vec::new(),
             buffers: Vec::new(),
             left_out: Vec::new(),
         };
         plan.plan_passes(view);
-        plan.plan_buffers(scene, soup, view, tree);
+        plan.plan_buffers(scene, soup, view, tree, textures);
         plan.explain_left_out(view);
         plan
     }
@@ -123,12 +143,12 @@ impl Plan {
                 self.passes.push(PlannedPass { name, dispatches: waves * dispatches, purpose });
             }
         };
-        let (shadows, reflections) = (self.features.shadows, self.features.reflections);
+        let (shadows, goes_on) = (self.features.shadows, self.features.rays_go_on());
         pass("primary", 1, "camera rays → nearest hits or background");
         // Hits before each round; after each light its shadow rays, after the last one the reflected rays too.
         let after_shading = if shadows {
             rounds * lights
-        } else if reflections {
+        } else if goes_on {
             rounds - 1
         } else {
             0
@@ -140,34 +160,37 @@ impl Plan {
             if shadows { rounds * lights } else { 0 },
             "shadow rays → the light's part, where nothing blocks it",
         );
-        pass("reflection", if reflections { rounds - 1 } else { 0 }, "reflected rays → nearest hits or background");
+        let reflection = "rays that were reflected, or go on behind a surface → nearest hits or background";
+        pass("reflection", if goes_on { rounds - 1 } else { 0 }, reflection);
         pass("resolve", 1, "samples → pixels");
     }
 
-    fn plan_buffers(&mut self, scene: &Scene, soup: &Soup, view: &View, tree: TreeSize) {
+    fn plan_buffers(&mut self, scene: &Scene, soup: &Soup, view: &View, tree: TreeSize, textures: &Textures) {
         let features = self.features;
         let triangles = soup.len() as u64;
         let in_flight = self.in_flight();
-        let per_triangle = |needed: bool| if needed { triangles * u64::from(TRIANGLE_TEXELS) * TEXEL } else { 0 };
+        let goes_on = features.rays_go_on();
         let queue = |needed: bool, item: usize| if needed { in_flight * item as u64 } else { 0 };
         let mut buffer = |name, bytes, is_queue| self.buffers.push(PlannedBuffer { name, bytes, is_queue });
         buffer("nodes", tree.nodes as u64 * u64::from(NODE_TEXELS) * TEXEL, false);
         buffer("triangles", tree.triangles as u64 * u64::from(TRIANGLE_TEXELS) * TEXEL, false);
-        buffer("normals", per_triangle(features.smooth_normals), false);
-        buffer("colors", per_triangle(features.vertex_colors), false);
-        buffer("materials", (scene.materials.len() * size_of::<Material>()) as u64, false);
+        let attributes = super::upload::attribute_kinds(features) * triangles * u64::from(TRIANGLE_TEXELS) * TEXEL;
+        buffer("attributes", attributes, false);
+        buffer("materials", scene.materials.len() as u64 * u64::from(MATERIAL_TEXELS) * TEXEL, false);
         let lights = if features.shadows { view.lights.len().max(1) * size_of::<Light>() } else { 0 };
         buffer("lights", lights as u64, false);
         buffer("instances", tree.instances as u64 * u64::from(INSTANCE_TEXELS) * TEXEL, false);
+        buffer("textures", (textures.records.len() * size_of::<Texture>()) as u64, false);
+        buffer("pixels", textures.bytes(), false);
         buffer("frame", size_of::<crate::layout::Frame>() as u64, false);
         buffer("hit_queue", queue(true, size_of::<HitItem>()), true);
         buffer("shadow_queue", queue(features.shadows, size_of::<RayItem>()), true);
-        buffer("reflection_queue", queue(features.reflections, size_of::<RayItem>()), true);
+        buffer("reflection_queue", queue(goes_on, size_of::<RayItem>()), true);
         buffer("retrace_queue", queue(true, size_of::<u32>()), true);
         buffer("counters", (4 * u64::from(crate::layout::COUNTERS)).next_multiple_of(PIXEL), false);
         buffer("dispatches", 12 * u64::from(crate::layout::QUEUES), false);
         buffer("shadow_radiance", queue(features.shadows, PIXEL as usize), true);
-        buffer("throughput", queue(features.reflections, PIXEL as usize), true);
+        buffer("throughput", queue(goes_on, PIXEL as usize), true);
         buffer("radiance", in_flight * PIXEL, false);
         buffer("film", u64::from(self.band_pixels) * PIXEL, false);
         buffer("film_rest", if features.multisampling { u64::from(self.band_pixels) * PIXEL } else { 0 }, false);
@@ -187,9 +210,14 @@ impl Plan {
         };
         leave(features.shadows, &["shadow pass", "shadow_queue", "shadow_radiance", "lights"], no_light);
         leave(features.specular, &["specular term"], if features.shadows { "no material is glossy" } else { no_light });
-        leave(features.reflections, &["reflection pass", "reflection_queue", "throughput"], no_mirror);
-        leave(features.smooth_normals, &["normals"], "all triangles are flat");
-        leave(features.vertex_colors, &["colors"], "no mesh has vertex colours");
+        let no_way_on = format!("{no_mirror}, and no surface lets light through");
+        leave(features.rays_go_on(), &["reflection pass", "reflection_queue", "throughput"], &no_way_on);
+        leave(features.smooth_normals, &["vertex normals"], "all triangles are flat");
+        leave(features.vertex_colors, &["vertex colours"], "no mesh has any");
+        leave(features.textures, &["texture coordinates", "textures", "pixels"], "no material has a texture");
+        leave(features.normal_maps, &["tangents"], "no material has a normal map");
+        leave(features.alpha, &["alpha tests"], "all materials are opaque");
+        leave(features.layers, &["rays behind surfaces"], "no surface lets light through");
         leave(features.single_sided, &["back-face culling"], "all materials are double-sided");
         leave(features.instances, &["instances"], "no mesh is shared, or that would save little");
         leave(features.deep_tree, &["watch over the stack"], "the tree is no deeper than the stack");

@@ -3,6 +3,7 @@
 
 use super::frame::Frame;
 use super::ray_sets::{BenchRay, SetKind};
+use super::textures::Textures;
 use super::{upload, Options, Plan, Rebase, Renderer};
 use crate::error::{Error, Result};
 use crate::layout::{
@@ -90,13 +91,15 @@ impl Renderer {
         let moller_trumbore = prepared.features.moller_trumbore;
         let features = Features { shadows: true, reflections: true, moller_trumbore, ..Features::default() };
         let features = tree.features(features);
-        let plan = Plan::new(scene, &prepared.soup, &prepared.view, features, tree.size(), width * height);
+        let textures = Textures::of(scene, features.textures)?;
+        let plan = Plan::with_textures(prepared, scene, features, tree.size(), width * height, &textures);
         if plan.waves(1) != 1 {
             return Err(Error::Usage(format!("{width}x{height} rays do not fit into one wave")));
         }
         let (soup, view) = (&prepared.soup, &prepared.view);
         let device_tree = tree.for_device(soup, view.camera.eye);
-        let on_device = upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase };
+        let on_device =
+            upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase, textures: &textures };
         let frame = Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts()))?;
         Ok(Tracer { frame, prepared, rebase: tree.rebase, order: device_tree.order, _alone: alone })
     }

@@ -1,15 +1,16 @@
 //! Scene → device buffers, in the layout of `shaders/shared/layout.glsl`.
 
+use super::textures::Textures;
 use super::tree::{DeviceTree, Rebase};
 use super::Renderer;
 use crate::error::Result;
 use crate::layout::{
-    self, binding, Features, FAR, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, TILE, TRIANGLE_COLORED,
-    TRIANGLE_SINGLE_SIDED, TRIANGLE_SMOOTH,
+    self, binding, Features, ALPHA_BLEND, ALPHA_MASK, ALPHA_OPAQUE, FAR, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT,
+    TILE, TRIANGLE_COLORED, TRIANGLE_SEE_THROUGH, TRIANGLE_SINGLE_SIDED, TRIANGLE_SMOOTH, TRIANGLE_TEXELS,
 };
-use crate::scene::{self, LightKind, Projection, Soup, View};
+use crate::scene::{self, AlphaMode, LightKind, Projection, Soup, UsedMap, View};
 use crate::vulkan::{Access, Buffer, Commands, Memory, Usage};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// All that is uploaded.
@@ -21,6 +22,7 @@ pub(super) struct Scene<'a> {
     pub tree: &'a DeviceTree,
     /// From world space to the device's.
     pub rebase: Rebase,
+    pub textures: &'a Textures,
 }
 
 impl Scene<'_> {
@@ -30,21 +32,16 @@ impl Scene<'_> {
         Some(match slot {
             binding::NODES => make("nodes", bytemuck::cast_slice(&self.tree.records), Usage::Fetch),
             binding::TRIANGLES => make("triangles", bytemuck::cast_slice(&self.triangles()), Usage::Fetch),
-            binding::NORMALS => {
-                let normals = if features.smooth_normals { self.normals() } else { Vec::new() };
-                make("normals", bytemuck::cast_slice(&normals), Usage::Fetch)
-            }
-            binding::COLORS => {
-                let colors = if features.vertex_colors { self.per_primitive(&self.soup.colors) } else { Vec::new() };
-                make("colors", bytemuck::cast_slice(&colors), Usage::Fetch)
-            }
+            binding::ATTRIBUTES => make("attributes", bytemuck::cast_slice(&self.attributes(features)), Usage::Fetch),
+            binding::TEXTURES => make("textures", bytemuck::cast_slice(&self.textures.records), Usage::Fetch),
+            binding::PIXELS => make("pixels", bytemuck::cast_slice(&self.textures.pixels), Usage::Fetch),
             binding::INSTANCES => {
                 let instances = if features.instances { self.tree.instances.as_slice() } else { &[] };
                 make("instances", bytemuck::cast_slice(instances), Usage::Fetch)
             }
-            binding::FRAME => make("frame", bytemuck::bytes_of(&self.frame()), Usage::Uniform),
+            binding::FRAME => make("frame", bytemuck::bytes_of(&self.frame(features)), Usage::Uniform),
             binding::MATERIALS => {
-                let materials: Vec<_> = self.scene.materials.iter().map(material).collect();
+                let materials: Vec<_> = self.scene.materials.iter().map(|own| self.material(own)).collect();
                 make("materials", bytemuck::cast_slice(&materials), Usage::Fetch)
             }
             binding::LIGHTS => {
@@ -74,6 +71,7 @@ impl Scene<'_> {
                 (flags.single_sided, TRIANGLE_SINGLE_SIDED),
                 (flags.smooth, TRIANGLE_SMOOTH),
                 (flags.colored, TRIANGLE_COLORED),
+                (flags.see_through, TRIANGLE_SEE_THROUGH),
             ];
             let flags: u32 = bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
             let extra = [*primitive, soup.materials[index] | flags, precedence[index]];
@@ -84,25 +82,46 @@ impl Scene<'_> {
         self.tree.order.par_iter().map(triangle).collect()
     }
 
+    /// What primitives have besides positions, kind after kind, three texels each; kinds that the scene needs and lacks are zeros.
+    fn attributes(&self, features: Features) -> Vec<[[u32; 4]; 3]> {
+        let turned = |normal: Vec3| {
+            let is_in_world = self.rebase.turns() && self.soup.is_flat();
+            if is_in_world {
+                self.rebase.direction(normal.as_dvec3())
+            } else {
+                normal
+            }
+        };
+        let bits = |vector: Vec4| vector.to_array().map(f32::to_bits);
+        let mut all = Vec::with_capacity(attribute_kinds(features) as usize * self.soup.len());
+        if features.smooth_normals {
+            all.extend(self.per_primitive(&self.soup.normals, |normal| bits(turned(*normal).extend(0.0))));
+        }
+        if features.vertex_colors {
+            all.extend(self.per_primitive(&self.soup.colors, |color| bits(*color)));
+        }
+        if features.textures {
+            all.extend(self.per_primitive(&self.soup.texcoords, |[first, second]| {
+                [first.x, first.y, second.x, second.y].map(f32::to_bits)
+            }));
+        }
+        if features.normal_maps {
+            all.extend(
+                self.per_primitive(&self.soup.tangents, |tangent| bits(turned(tangent.truncate()).extend(tangent.w))),
+            );
+        }
+        all
+    }
+
     /// Three texels a primitive; zeros where the soup has no such data.
-    fn per_primitive(&self, vectors: &[[Vec3; 3]]) -> Vec<[[u32; 4]; 3]> {
-        if vectors.is_empty() {
+    fn per_primitive<T: Sync>(&self, corners: &[[T; 3]], texel: impl Fn(&T) -> [u32; 4] + Sync) -> Vec<[[u32; 4]; 3]> {
+        if corners.is_empty() {
             return vec![[[0; 4]; 3]; self.soup.len()];
         }
-        vectors.par_iter().map(|corners| corners.map(|corner| with_bits(corner, 0))).collect()
+        corners.par_iter().map(|[a, b, c]| [texel(a), texel(b), texel(c)]).collect()
     }
 
-    /// Vertex normals, turned as the world is where they stand in it.
-    fn normals(&self) -> Vec<[[u32; 4]; 3]> {
-        let mut normals = std::borrow::Cow::Borrowed(&self.soup.normals);
-        if self.rebase.turns() && self.soup.is_flat() {
-            let turn = |normal: Vec3| self.rebase.direction(normal.as_dvec3());
-            normals.to_mut().par_iter_mut().for_each(|corners| *corners = corners.map(turn));
-        }
-        self.per_primitive(&normals)
-    }
-
-    fn frame(&self) -> layout::Frame {
+    fn frame(&self, features: Features) -> layout::Frame {
         let view = self.view;
         let (mut right, mut up) = view.camera.half_axes(f64::from(view.width) / f64::from(view.height));
         let is_orthographic = matches!(view.camera.projection, Projection::Orthographic { .. });
@@ -111,6 +130,11 @@ impl Scene<'_> {
             up *= self.rebase.scale;
         }
         let (strata_x, strata_y) = view.strata();
+        let kind = self.soup.len() as u32 * TRIANGLE_TEXELS;
+        let first_color = if features.smooth_normals { kind } else { 0 };
+        let first_texcoord = first_color + if features.vertex_colors { kind } else { 0 };
+        let first_tangent = first_texcoord + if features.textures { kind } else { 0 };
+        let [start, spread] = view.cone();
         layout::Frame {
             eye: self.rebase.point(view.camera.eye).into(),
             forward: self.rebase.direction(view.camera.forward).into(),
@@ -132,7 +156,63 @@ impl Scene<'_> {
             filter_zero: view.filter.zero().min(f64::from(FAR)) as f32,
             filter_mean: view.filter.mean_weight() as f32,
             fixed_epsilon: (1e-4 * self.rebase.scale) as f32,
+            first_color,
+            first_texcoord,
+            first_tangent,
+            max_depth: view.max_depth,
+            cone: [(start * self.rebase.scale) as f32, spread as f32],
         }
+    }
+
+    /// A material and its look. The coefficients are linear in the tint: what is left at tint 0 is constant, the rest is multiplied.
+    fn material(&self, material: &scene::Material) -> MaterialAndLook {
+        let (constant, full) = (material.whitted(DVec3::ZERO), material.whitted(DVec3::ONE));
+        let coefficients = layout::Material {
+            ambient_tinted: full.ambient.as_vec3().into(),
+            emission: material.emission.as_vec3().into(),
+            diffuse_tinted: full.diffuse.as_vec3().into(),
+            specular: constant.specular.as_vec3().into(),
+            specular_tinted: (full.specular - constant.specular).as_vec3().into(),
+            shininess: full.shininess as f32,
+            mirror: constant.mirror.as_vec3().into(),
+            mirror_tinted: (full.mirror - constant.mirror).as_vec3().into(),
+            unused: [0.0; 2],
+        };
+        let maps = material
+            .drawn_maps()
+            .list()
+            .map(|(map, is_srgb)| map.map_or(0, |map| self.textures.number_of(&UsedMap { map, is_srgb })));
+        let [base_color, metallic_roughness, normal, occlusion, emission, specular, specular_color, transmission] =
+            maps;
+        let (alpha_mode, cutoff) = match material.alpha_mode {
+            AlphaMode::Opaque => (ALPHA_OPAQUE, 0.0),
+            AlphaMode::Mask(cutoff) => (ALPHA_MASK, cutoff),
+            AlphaMode::Blend => (ALPHA_BLEND, 0.0),
+        };
+        let follows_rule = material.whitted.is_none() && !material.unlit;
+        let look = layout::Look {
+            base_color: material.base_color.as_vec3().into(),
+            alpha: material.alpha as f32,
+            metallic: material.metallic as f32,
+            roughness: material.roughness as f32,
+            occlusion_strength: material.occlusion_strength as f32,
+            normal_scale: material.normal_scale as f32,
+            dielectric: material.dielectric().as_vec3().into(),
+            cutoff: cutoff as f32,
+            base_color_map: base_color,
+            metallic_roughness_map: metallic_roughness,
+            normal_map: normal,
+            occlusion_map: occlusion,
+            emission_map: emission,
+            specular_map: specular,
+            specular_color_map: specular_color,
+            transmission_map: transmission,
+            transmission: if follows_rule { material.transmission as f32 } else { 0.0 },
+            alpha_mode,
+            follows_rule: u32::from(follows_rule),
+            unused: 0,
+        };
+        MaterialAndLook { material: coefficients, look }
     }
 
     fn light(&self, light: &scene::Light) -> layout::Light {
@@ -160,24 +240,22 @@ impl Scene<'_> {
     }
 }
 
-fn with_bits(vector: Vec3, bits: u32) -> [u32; 4] {
-    [vector.x.to_bits(), vector.y.to_bits(), vector.z.to_bits(), bits]
+/// Kinds of attributes on the device.
+pub(super) fn attribute_kinds(features: Features) -> u64 {
+    let Features { smooth_normals, vertex_colors, textures, normal_maps, .. } = features;
+    [smooth_normals, vertex_colors, textures, normal_maps].map(u64::from).iter().sum()
 }
 
-/// The coefficients are linear in the tint: what is left at tint 0 is constant, the rest is multiplied.
-fn material(material: &scene::Material) -> layout::Material {
-    let (constant, full) = (material.whitted(DVec3::ZERO), material.whitted(DVec3::ONE));
-    layout::Material {
-        ambient_tinted: full.ambient.as_vec3().into(),
-        emission: material.emission.as_vec3().into(),
-        diffuse_tinted: full.diffuse.as_vec3().into(),
-        specular: constant.specular.as_vec3().into(),
-        specular_tinted: (full.specular - constant.specular).as_vec3().into(),
-        shininess: full.shininess as f32,
-        mirror: constant.mirror.as_vec3().into(),
-        mirror_tinted: (full.mirror - constant.mirror).as_vec3().into(),
-        unused: [0.0; 2],
-    }
+/// What lies in the buffer of materials.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(super) struct MaterialAndLook {
+    material: layout::Material,
+    look: layout::Look,
+}
+
+fn with_bits(vector: Vec3, bits: u32) -> [u32; 4] {
+    [vector.x.to_bits(), vector.y.to_bits(), vector.z.to_bits(), bits]
 }
 
 /// Makes the buffer of a slot that only the frame itself writes.

@@ -15,7 +15,8 @@ pub fn of(scene: &Scene, soup: &Soup, view: &View) -> Features {
     let any = |of: fn(&Material) -> DVec3| materials.iter().any(|material| of(material).max_element() > 0.0);
     let specular = any(|material| material.whitted(DVec3::ONE).specular);
     let diffuse = any(|material| material.whitted(DVec3::ONE).diffuse);
-    let mirror = any(|material| material.whitted(DVec3::ONE).mirror);
+    let mirror = any(most_mirroring);
+    let maps = |of: fn(&super::Maps) -> bool| materials.iter().any(|material| of(&material.drawn_maps()));
     let shadows = !view.lights.is_empty() && (specular || diffuse);
     Features {
         smooth_normals: soup.flags.iter().any(|flags| flags.smooth),
@@ -28,6 +29,10 @@ pub fn of(scene: &Scene, soup: &Soup, view: &View) -> Features {
         sobol: view.samples > 1 && view.sampler == Sampler::Sobol,
         independent: view.samples > 1 && view.sampler == Sampler::Independent,
         filter: view.samples > 1 && view.filter != Filter::Box,
+        textures: maps(super::Maps::any),
+        normal_maps: maps(|maps| maps.normal.is_some()),
+        alpha: materials.iter().any(|material| material.is_see_through()),
+        layers: materials.iter().any(|material| material.lets_light_through()),
         // These are the renderer's to know.
         deep_tree: false,
         instances: false,
@@ -36,4 +41,14 @@ pub fn of(scene: &Scene, soup: &Soup, view: &View) -> Features {
         moller_trumbore: false,
         plain_sums: false,
     }
+}
+
+/// The mirror coefficient where a material mirrors most: with a map, roughness and metallic may be anything up to their factors.
+fn most_mirroring(material: &Material) -> DVec3 {
+    let mirror = |material: &Material| material.whitted(DVec3::ONE).mirror;
+    if material.drawn_maps().metallic_roughness.is_none() {
+        return mirror(material);
+    }
+    let smooth = Material { roughness: 0.0, ..material.clone() };
+    mirror(&smooth).max(mirror(&Material { metallic: 0.0, ..smooth }))
 }

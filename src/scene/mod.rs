@@ -14,26 +14,36 @@ mod camera;
 mod dice;
 pub mod features;
 pub mod gltf;
+mod image;
 mod light;
+mod lobes;
 mod material;
+mod mipmap;
 mod precedence;
 mod sampling;
 pub mod shapes;
 mod soup;
+mod tangents;
 mod teapot;
+mod texture;
 mod view;
 
 pub use background::Background;
 pub use builtin::{built_in, BUILT_IN};
 pub use camera::{Camera, CameraChoice, Projection};
+pub use image::{Image, Pixels};
 pub use light::{Light, LightKind};
-pub use material::{Material, Whitted};
+pub use lobes::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Lobes, Sheen, Volume};
+pub use material::{AlphaMode, Material, Whitted};
+pub use mipmap::Mipmaps;
 pub use precedence::precedence;
 pub use sampling::{Filter, Sampler};
 pub use soup::{Instancing, Placement, Soup, TriangleFlags};
+pub use texture::{Map, Maps, Minify, Texture, UsedMap, Wrap};
 pub use view::{View, MAX_SAMPLES};
 
-use glam::{DMat4, Vec3};
+use glam::{DMat4, Vec2, Vec3, Vec4};
+use std::sync::Arc;
 
 /// One glTF primitive: triangles of one material.
 #[derive(Clone, Debug, Default)]
@@ -44,8 +54,13 @@ pub struct Mesh {
     pub positions: Vec<Vec3>,
     /// Vertex normals, object space, one a position; empty for flat shading.
     pub normals: Vec<Vec3>,
-    /// Vertex colours, linear RGB, one a position; empty for white.
-    pub colors: Vec<Vec3>,
+    /// Tangents (xyz) and signs of the bitangents (w), object space, one for each corner of each triangle; empty where no normal map needs
+    /// them.
+    pub tangents: Vec<[Vec4; 3]>,
+    /// Texture coordinates, two sets, one a position; empty without.
+    pub texcoords: Vec<[Vec2; 2]>,
+    /// Vertex colours, linear RGB and alpha, one a position; empty for opaque white.
+    pub colors: Vec<Vec4>,
     /// Three vertices a triangle, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`].
@@ -72,6 +87,10 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Materials; never empty when there are meshes.
     pub materials: Vec<Material>,
+    /// Textures that materials' maps name.
+    pub textures: Vec<Texture>,
+    /// Pictures that textures name; `None` for one that nothing visible uses, or that cannot be read.
+    pub images: Vec<Option<Arc<Image>>>,
     /// Lights, world space.
     pub lights: Vec<Light>,
     /// The file declares lights, be it dark ones: then no default light is added.

@@ -12,18 +12,19 @@ pub fn precedence(scene: &Scene, soup: &Soup) -> Vec<u32> {
         .iter()
         .map(|material| format!("{material:?}").bytes().fold(0x811c_9dc5, |hash, byte| mix(hash, byte.into())))
         .collect();
-    let vectors = |of: &[[glam::Vec3; 3]], primitive: usize, hash: u32| {
-        let corners = of.get(primitive).into_iter().flatten();
-        corners.flat_map(|corner| corner.to_array()).fold(hash, |hash, value| mix(hash, value.to_bits()))
-    };
+    let values = |hash, values: &[f32]| values.iter().fold(hash, |hash, value| mix(hash, value.to_bits()));
     let of_primitive = |primitive: usize| {
         let flags = soup.flags[primitive];
         let mut hash = materials[soup.materials[primitive] as usize];
         if flags.smooth {
-            hash = vectors(&soup.normals, primitive, hash);
+            hash = soup.normals[primitive].iter().fold(hash, |hash, normal| values(hash, &normal.to_array()));
         }
         if flags.colored {
-            hash = vectors(&soup.colors, primitive, hash);
+            hash = soup.colors[primitive].iter().fold(hash, |hash, color| values(hash, &color.to_array()));
+        }
+        if scene.materials[soup.materials[primitive] as usize].drawn_maps().any() {
+            let sets = soup.texcoords[primitive].iter().flatten();
+            hash = sets.fold(hash, |hash, texcoord| values(hash, &texcoord.to_array()));
         }
         hash
     };

@@ -4,7 +4,7 @@
 use super::{Instance, Mesh, Scene};
 use crate::error::{Error, Result};
 use crate::layout::MATERIAL_BITS;
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
 use std::ops::Range;
 
 /// What is known of a triangle besides its corners.
@@ -16,6 +16,8 @@ pub struct TriangleFlags {
     pub smooth: bool,
     /// It has colours.
     pub colored: bool,
+    /// Its material is not opaque.
+    pub see_through: bool,
 }
 
 /// Where a part of a soup stands.
@@ -59,8 +61,12 @@ pub struct Soup {
     pub flags: Vec<TriangleFlags>,
     /// Unit normals at the corners in the space of their part; zero where not smooth; empty if no triangle is.
     pub normals: Vec<[Vec3; 3]>,
-    /// Colours at the corners; white where not coloured; empty if no triangle is.
-    pub colors: Vec<[Vec3; 3]>,
+    /// Colours and alphas at the corners; opaque white where not coloured; empty if no triangle is.
+    pub colors: Vec<[Vec4; 3]>,
+    /// Two sets of texture coordinates at the corners; empty if no triangle has a texture.
+    pub texcoords: Vec<[[Vec2; 2]; 3]>,
+    /// Unit tangents at the corners in the space of their part, w = sign of the bitangent; empty if no triangle has a normal map.
+    pub tangents: Vec<[Vec4; 3]>,
     /// Lower corner of the box around everything, world space.
     pub lo: DVec3,
     /// Upper corner.
@@ -78,7 +84,7 @@ const MAX_MATERIALS: usize = 1 << MATERIAL_BITS;
 /// Sizes of scenes. The device gets them scaled; this is what the scene's own f32 positions and intensities can mean.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
-/// Bytes that a triangle takes on the device: corners and its share of the tree; vertex normals or colours.
+/// Bytes that a triangle takes on the device: corners and its share of the tree; one of its attributes.
 const TRIANGLE_BYTES: usize = 48 + 16;
 const ATTRIBUTE_BYTES: usize = 48;
 /// Bytes that an instance takes on the device: its transforms and its share of the upper tree.
@@ -113,6 +119,8 @@ impl Soup {
         let attributes = Attributes {
             smooth: used().any(|mesh| !mesh.normals.is_empty()),
             colored: used().any(|mesh| !mesh.colors.is_empty()),
+            textured: used().any(|mesh| scene.materials[mesh.material].drawn_maps().any()),
+            tangents: used().any(|mesh| scene.materials[mesh.material].drawn_maps().normal.is_some()),
         };
         let shared = shared_meshes(scene, instancing, attributes);
         let is_own = |instance: &&Instance| !shared[instance.mesh];
@@ -203,7 +211,7 @@ impl Soup {
 
     /// Adds an instance.
     fn add(&mut self, scene: &Scene, instance: &Instance, attributes: Attributes) -> Added {
-        let Attributes { smooth, colored } = attributes;
+        let Attributes { smooth, colored, textured, tangents } = attributes;
         let mesh = &scene.meshes[instance.mesh];
         let linear = DMat3::from_mat4(instance.world_from_object);
         let determinant = linear.determinant();
@@ -224,10 +232,16 @@ impl Soup {
         let points: Vec<DVec3> =
             mesh.positions.iter().map(|p| instance.world_from_object.transform_point3(p.as_dvec3())).collect();
         let normals: Vec<Vec3> = mesh.normals.iter().map(world_normal).collect();
+        // A tangent lies in the surface and moves with it; a mirroring transform turns the bitangent round.
+        let world_tangent = |tangent: Vec4| {
+            let world = (linear * tangent.truncate().as_dvec3()).try_normalize().unwrap_or(DVec3::ZERO);
+            world.as_vec3().extend(tangent.w * determinant.signum() as f32)
+        };
+        let material = &scene.materials[mesh.material];
         let mut not_finite = 0;
-        for corners in &mesh.triangles {
-            let [a, b, c] = corners.map(|index| index as usize);
-            let corners = if determinant < 0.0 { [a, c, b] } else { [a, b, c] };
+        for (index, corners) in mesh.triangles.iter().enumerate() {
+            let places = if determinant < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
+            let corners = places.map(|place: usize| corners[place] as usize);
             let positions = corners.map(|corner| points[corner]);
             if !positions.iter().all(|point| point.is_finite() && point.abs().max_element() < 1e30) {
                 not_finite += 1;
@@ -244,12 +258,20 @@ impl Soup {
             }
             if colored {
                 let white = mesh.colors.is_empty();
-                self.colors.push(corners.map(|corner| if white { Vec3::ONE } else { mesh.colors[corner] }));
+                self.colors.push(corners.map(|corner| if white { Vec4::ONE } else { mesh.colors[corner] }));
+            }
+            if textured {
+                self.texcoords.push(corners.map(|corner| mesh.texcoords.get(corner).copied().unwrap_or_default()));
+            }
+            if tangents {
+                let own = mesh.tangents.get(index).copied().unwrap_or_default();
+                self.tangents.push(places.map(|place| world_tangent(own[place])));
             }
             self.flags.push(TriangleFlags {
-                single_sided: !scene.materials[mesh.material].double_sided,
+                single_sided: !material.double_sided,
                 smooth: is_smooth,
                 colored: !mesh.colors.is_empty(),
+                see_through: material.is_see_through(),
             });
         }
         Added { flattened: false, not_finite }
@@ -293,6 +315,15 @@ impl Soup {
 struct Attributes {
     smooth: bool,
     colored: bool,
+    textured: bool,
+    tangents: bool,
+}
+
+impl Attributes {
+    /// How many there are.
+    fn count(&self) -> usize {
+        [self.smooth, self.colored, self.textured, self.tangents].into_iter().filter(|has| *has).count()
+    }
 }
 
 /// The transform has no volume.
@@ -311,8 +342,7 @@ fn shared_meshes(scene: &Scene, instancing: Instancing, attributes: Attributes) 
         let elements = instance.world_from_object.to_cols_array();
         may_share[instance.mesh] &= elements.iter().all(|element| element.abs() < 1e12);
     }
-    let triangle =
-        TRIANGLE_BYTES + ATTRIBUTE_BYTES * (usize::from(attributes.smooth) + usize::from(attributes.colored));
+    let triangle = TRIANGLE_BYTES + ATTRIBUTE_BYTES * attributes.count();
     let saved = |mesh: usize| {
         let (bytes, count) = (scene.meshes[mesh].triangles.len() * triangle, instances[mesh]);
         (bytes * count).saturating_sub(bytes + count * INSTANCE_BYTES)

@@ -1,6 +1,6 @@
 //! A picture to be taken of a scene: camera, lights that shine, size, samples, depth, background.
 
-use super::{Background, Camera, Filter, Light, Sampler, Scene};
+use super::{Background, Camera, Filter, Light, Projection, Sampler, Scene};
 use crate::error::{Error, Result};
 use std::f64::consts::PI;
 
@@ -84,6 +84,17 @@ impl View {
             self.lights.push(Light::directional(direction, glam::DVec3::splat(PI)));
         }
         self
+    }
+
+    /// The cone of a camera ray: its diameter where it starts, world lengths, and by how much it grows with the ray's length. It covers a
+    /// sample's share of the pixel, but no less than a 64th, which is finer than any picture shows.
+    pub fn cone(&self) -> [f64; 2] {
+        let (_, up) = self.camera.half_axes(f64::from(self.width) / f64::from(self.height));
+        let diameter = 2.0 * up.length() / f64::from(self.height) / f64::from(self.samples.min(64)).sqrt();
+        match self.camera.projection {
+            Projection::Perspective { .. } => [0.0, diameter],
+            Projection::Orthographic { .. } => [diameter, 0.0],
+        }
     }
 
     /// Columns and rows of sample cells in a pixel: the most square factors of the number of samples.

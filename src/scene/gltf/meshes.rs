@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::scene::{Mesh, Scene};
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
-use glam::Vec3;
+use glam::{Vec2, Vec3, Vec4};
 
 impl Document<'_> {
     /// Adds every primitive that can be drawn; answers, for each glTF mesh, the indices of what it became.
@@ -55,7 +55,10 @@ impl Document<'_> {
         let positions = self.vectors(place, "POSITION", positions, None)?;
         let count = positions.len();
         let normals = attribute(Semantic::Normals).map(|index| self.vectors(place, "NORMAL", index, Some(count)));
-        let colors = attribute(Semantic::Colors(0)).map(|index| self.vectors(place, "COLOR_0", index, Some(count)));
+        let colors = attribute(Semantic::Colors(0)).map(|index| self.colors(place, index, count));
+        let texcoord = |set| attribute(Semantic::TexCoords(set)).map(|index| self.texcoords(place, set, index, count));
+        let (first, second) = (texcoord(0).transpose()?, texcoord(1).transpose()?);
+        let tangents = attribute(Semantic::Tangents).map(|index| self.tangents(place, index, count)).transpose()?;
         let corners = match primitive.indices {
             Some(index) => self.indices(index.value())?,
             None => (0..count as u32).collect(),
@@ -68,24 +71,65 @@ impl Document<'_> {
             self.warnings.add(format!("dropped: {place} has {} corners, not whole triangles", corners.len()));
         }
         let (normals, colors) = (normals.transpose()?.unwrap_or_default(), colors.transpose()?.unwrap_or_default());
-        let in_range = |color: &Vec3| color.cmpge(Vec3::ZERO).all() && color.cmple(Vec3::ONE).all();
+        let in_range = |color: &Vec4| color.cmpge(Vec4::ZERO).all() && color.cmple(Vec4::ONE).all();
         if !colors.iter().all(in_range) {
             self.warnings.add(format!("{place}: COLOR_0 has values outside 0 to 1; they were clamped"));
         }
         Ok(Some(Mesh {
             positions,
             normals,
-            colors: colors.into_iter().map(|color| finite(color).clamp(Vec3::ZERO, Vec3::ONE)).collect(),
+            colors: colors.into_iter().map(|color| finite(color).clamp(Vec4::ZERO, Vec4::ONE)).collect(),
+            texcoords: both_sets(first, second),
+            tangents: tangents.map_or(Vec::new(), |tangents| {
+                triangles.iter().map(|corners| corners.map(|corner| tangents[corner as usize])).collect()
+            }),
             triangles,
             ..Mesh::default()
         }))
     }
 
-    /// An attribute of three components (or four, of which the last is dropped), `count` of them if given.
+    /// Elements of an attribute, `count` of them, of as many components as allowed.
+    fn attribute(
+        &self,
+        place: &str,
+        name: &str,
+        accessor: usize,
+        components: &[usize],
+        count: usize,
+    ) -> Result<Elements<f32>> {
+        let elements = self.floats(accessor)?;
+        let refuse = |message: String| Err(self.refuse(format!("{place}: {name} (accessors[{accessor}]) {message}")));
+        if !components.contains(&elements.components) {
+            return refuse(format!("has {} components", elements.components));
+        }
+        match elements.values.len() / elements.components {
+            own if own != count => refuse(format!("has {own} elements, POSITION has {count}")),
+            _ => Ok(elements),
+        }
+    }
+
+    /// Colours; alpha is 1 where there is none.
+    fn colors(&self, place: &str, accessor: usize, count: usize) -> Result<Vec<Vec4>> {
+        let Elements { components, values } = self.attribute(place, "COLOR_0", accessor, &[3, 4], count)?;
+        let color = |own: &[f32]| Vec4::new(own[0], own[1], own[2], own.get(3).copied().unwrap_or(1.0));
+        Ok(values.chunks_exact(components).map(color).collect())
+    }
+
+    fn texcoords(&self, place: &str, set: u32, accessor: usize, count: usize) -> Result<Vec<Vec2>> {
+        let elements = self.attribute(place, &format!("TEXCOORD_{set}"), accessor, &[2], count)?;
+        Ok(elements.values.chunks_exact(2).map(Vec2::from_slice).collect())
+    }
+
+    fn tangents(&self, place: &str, accessor: usize, count: usize) -> Result<Vec<Vec4>> {
+        let elements = self.attribute(place, "TANGENT", accessor, &[4], count)?;
+        Ok(elements.values.chunks_exact(4).map(Vec4::from_slice).collect())
+    }
+
+    /// An attribute of three components, `count` of them if given.
     fn vectors(&self, place: &str, name: &str, accessor: usize, count: Option<usize>) -> Result<Vec<Vec3>> {
         let refuse = |message: String| self.refuse(format!("{place}: {name} (accessors[{accessor}]) {message}"));
         let Elements { components, values } = self.floats(accessor)?;
-        if components != 3 && !(components == 4 && name == "COLOR_0") {
+        if components != 3 {
             return Err(refuse(format!("has {components} components")));
         }
         let vectors: Vec<Vec3> = values.chunks_exact(components).map(Vec3::from_slice).collect();
@@ -98,8 +142,18 @@ impl Document<'_> {
     }
 }
 
-fn finite(v: Vec3) -> Vec3 {
-    Vec3::from_array(v.to_array().map(|value| if value.is_finite() { value } else { 0.0 }))
+fn finite(v: Vec4) -> Vec4 {
+    Vec4::from_array(v.to_array().map(|value| if value.is_finite() { value } else { 0.0 }))
+}
+
+/// Two sets of texture coordinates, vertex by vertex; one that is missing is 0.
+fn both_sets(first: Option<Vec<Vec2>>, second: Option<Vec<Vec2>>) -> Vec<[Vec2; 2]> {
+    match (first, second) {
+        (None, None) => Vec::new(),
+        (Some(first), None) => first.into_iter().map(|first| [first, Vec2::ZERO]).collect(),
+        (None, Some(second)) => second.into_iter().map(|second| [Vec2::ZERO, second]).collect(),
+        (Some(first), Some(second)) => first.into_iter().zip(second).map(|(first, second)| [first, second]).collect(),
+    }
 }
 
 /// Triangles of a list, strip or fan (glTF 2.0, 3.7.2.1); every second one of a strip is turned round.

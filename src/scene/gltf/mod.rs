@@ -14,6 +14,7 @@ mod container;
 mod materials;
 mod meshes;
 mod nodes;
+mod textures;
 
 use super::Scene;
 use crate::error::{Error, Result};
@@ -74,6 +75,7 @@ pub fn parse(
     document.check_data();
     document.note_what_is_not_shown();
     let mut scene = Scene { name, ..Scene::default() };
+    document.add_textures(&mut scene);
     document.add_materials(&mut scene);
     let primitives = document.add_meshes(&mut scene)?;
     document.add_nodes(&mut scene, &primitives, scene_choice)?;
@@ -92,6 +94,8 @@ struct Document<'a> {
     warnings: Warnings,
     /// Numbers that accessors have been expanded to.
     spent: Cell<u64>,
+    /// Materials, textures and the like as they are in the file.
+    raw: Value,
 }
 
 impl<'a> Document<'a> {
@@ -105,8 +109,22 @@ impl<'a> Document<'a> {
         check::version(&value).map_err(refuse)?;
         check::required_extensions(&value).map_err(refuse)?;
         check::document(&value, container.binary.is_some(), &mut warnings).map_err(refuse)?;
+        let mut raw = serde_json::Map::new();
+        for name in ["materials", "textures", "samplers", "images"] {
+            raw.insert(name.into(), value.get(name).cloned().unwrap_or_default());
+        }
         let root = typed(container.json, value).map_err(|error| refuse(format!("not a glTF document: {error}")))?;
-        Ok(Self { file, root, buffers: Vec::new(), warnings, spent: Cell::new(0) })
+        Ok(Self { file, root, buffers: Vec::new(), warnings, spent: Cell::new(0), raw: Value::Object(raw) })
+    }
+
+    /// A list of the document as it is in the file.
+    fn raw(&self, name: &str) -> Vec<Value> {
+        self.raw.get(name).and_then(Value::as_array).cloned().unwrap_or_default()
+    }
+
+    /// Number of textures.
+    fn root_textures(&self) -> usize {
+        self.raw.get("textures").and_then(Value::as_array).map_or(0, Vec::len)
     }
 
     fn refuse(&self, message: impl ToString) -> Error {
@@ -119,7 +137,6 @@ impl<'a> Document<'a> {
         let notes = [
             (root.skins.len(), "skins: meshes stand in their bind pose"),
             (root.animations.len(), "animations: the nodes' own transforms are shown"),
-            (root.textures.len(), "textures: factors alone colour the materials"),
         ];
         for (count, what) in notes {
             if count > 0 {

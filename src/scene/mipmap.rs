@@ -1,0 +1,144 @@
+//! Mipmaps: a picture, then the same half as wide and high, down to one pixel.
+
+use super::{Image, Pixels};
+use rayon::prelude::*;
+
+/// A picture in levels, each half as wide and high as the one before, rounded down, but at least 1.
+#[derive(Clone, Debug)]
+pub struct Mipmaps {
+    /// Width, height and pixels of each level.
+    pub levels: Vec<(u32, u32, Pixels)>,
+}
+
+impl Mipmaps {
+    /// The levels of a picture: the mean of the pixels that each covers, by area. Colours in sRGB are averaged as the light that they stand for.
+    pub fn of(image: &Image, is_srgb: bool) -> Self {
+        let mut levels = vec![(image.width, image.height, image.pixels.clone())];
+        while let Some((width, height, pixels)) = levels.last().filter(|(width, height, _)| *width > 1 || *height > 1) {
+            let smaller = match pixels {
+                Pixels::Rgba8(pixels) => {
+                    let light: Vec<f32> = (0..=255_u8).map(|value| decode(value, is_srgb)).collect();
+                    let decoded =
+                        |[r, g, b, a]: [u8; 4]| [light[r as usize], light[g as usize], light[b as usize], f32::from(a)];
+                    Pixels::Rgba8(halved(*width, *height, pixels, decoded, |mean| {
+                        let [r, g, b, a] = mean;
+                        let color = [r, g, b].map(|value| encode(value, is_srgb));
+                        [color[0], color[1], color[2], a.round() as u8]
+                    }))
+                }
+                Pixels::Rgba16(pixels) => Pixels::Rgba16(halved(
+                    *width,
+                    *height,
+                    pixels,
+                    |pixel| pixel.map(f32::from),
+                    |mean| mean.map(|value| value.round() as u16),
+                )),
+            };
+            levels.push(((width / 2).max(1), (height / 2).max(1), smaller));
+        }
+        Self { levels }
+    }
+
+    /// The picture alone.
+    pub fn whole(image: &Image) -> Self {
+        Self { levels: vec![(image.width, image.height, image.pixels.clone())] }
+    }
+}
+
+/// The part of one pixel of a side of `to` that pixels of a side of `from` fill: first of them and their weights.
+fn covered(place: u32, from: u32, to: u32) -> (u32, [f32; 3]) {
+    let ratio = from as f32 / to as f32;
+    let (start, end) = (place as f32 * ratio, (place + 1) as f32 * ratio);
+    let first = start.floor();
+    let share = |index: f32| ((end.min(first + index + 1.0) - start.max(first + index)) / ratio).max(0.0);
+    (first as u32, [share(0.0), share(1.0), share(2.0)])
+}
+
+/// A level half as wide and high.
+fn halved<T: Copy + Send + Sync>(
+    width: u32,
+    height: u32,
+    pixels: &[T],
+    decoded: impl Fn(T) -> [f32; 4] + Sync,
+    encoded: impl Fn([f32; 4]) -> T + Sync,
+) -> Vec<T> {
+    let (across, down) = ((width / 2).max(1), (height / 2).max(1));
+    let columns: Vec<(u32, [f32; 3])> = (0..across).map(|x| covered(x, width, across)).collect();
+    let row = |y: u32| {
+        let (top, rows) = covered(y, height, down);
+        let (pixels, columns, decoded, encoded) = (&pixels, &columns, &decoded, &encoded);
+        columns.iter().map(move |(left, columns)| {
+            let mut mean = [0.0_f32; 4];
+            for (dy, row_weight) in rows.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+                for (dx, weight) in columns.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+                    let (x, y) = ((left + dx as u32).min(width - 1), (top + dy as u32).min(height - 1));
+                    let pixel = decoded(pixels[y as usize * width as usize + x as usize]);
+                    for (sum, value) in mean.iter_mut().zip(pixel) {
+                        *sum += row_weight * weight * value;
+                    }
+                }
+            }
+            encoded(mean)
+        })
+    };
+    (0..down).into_par_iter().flat_map_iter(row).collect()
+}
+
+/// Light of a colour channel, 0 to 255 for numbers, 0 to 1 for sRGB (IEC 61966-2-1).
+fn decode(value: u8, is_srgb: bool) -> f32 {
+    let share = f32::from(value) / 255.0;
+    match is_srgb {
+        false => f32::from(value),
+        true if share <= 0.04045 => share / 12.92,
+        true => ((share + 0.055) / 1.055).powf(2.4),
+    }
+}
+
+/// Undoes [`decode`].
+fn encode(light: f32, is_srgb: bool) -> u8 {
+    let value = match is_srgb {
+        false => light,
+        true if light <= 0.003_130_8 => 255.0 * 12.92 * light,
+        true => 255.0 * (1.055 * light.powf(1.0 / 2.4) - 0.055),
+    };
+    value.round() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(width: u32, height: u32, pixels: Vec<[u8; 4]>) -> Image {
+        let pixels = Pixels::Rgba8(pixels);
+        Image { name: String::new(), format: String::new(), width, height, pixels, bytes: 0 }
+    }
+
+    #[test]
+    fn levels_halve_down_to_one_pixel() {
+        let mipmaps = Mipmaps::of(&image(5, 2, vec![[9, 9, 9, 255]; 10]), true);
+        let sizes: Vec<(u32, u32)> = mipmaps.levels.iter().map(|(width, height, _)| (*width, *height)).collect();
+        assert_eq!(sizes, [(5, 2), (2, 1), (1, 1)]);
+        assert!(mipmaps.levels.iter().all(|(_, _, pixels)| {
+            matches!(pixels, Pixels::Rgba8(pixels) if pixels.iter().all(|pixel| *pixel == [9, 9, 9, 255]))
+        }));
+    }
+
+    #[test]
+    fn black_and_white_are_half_the_light() {
+        let checker = vec![[0, 0, 0, 0], [255, 255, 255, 255], [255, 255, 255, 255], [0, 0, 0, 0]];
+        let mean = |is_srgb| match &Mipmaps::of(&image(2, 2, checker.clone()), is_srgb).levels[1].2 {
+            Pixels::Rgba8(pixels) => pixels[0],
+            Pixels::Rgba16(_) => unreachable!(),
+        };
+        assert_eq!(mean(true), [188, 188, 188, 128]);
+        assert_eq!(mean(false), [128; 4]);
+    }
+
+    #[test]
+    fn odd_sides_are_weighed_by_area() {
+        let row = vec![[0, 0, 0, 0], [30, 0, 0, 0], [60, 0, 0, 0]];
+        let Pixels::Rgba8(last) = &Mipmaps::of(&image(3, 1, row), false).levels[1].2 else { unreachable!() };
+        assert_eq!(last[0][0], 30);
+        assert_eq!(covered(0, 5, 2), (0, [0.4, 0.4, 0.2]));
+    }
+}
