@@ -14,6 +14,7 @@ mod camera;
 mod dice;
 pub mod features;
 pub mod gltf;
+mod image;
 mod light;
 mod material;
 mod precedence;
@@ -23,6 +24,7 @@ mod soup;
 mod teapot;
 mod view;
 
+pub use self::image::{Image, Pixels};
 pub use background::Background;
 pub use builtin::{built_in, BUILT_IN};
 pub use camera::{Camera, CameraChoice, Projection};

@@ -1,10 +1,10 @@
 //! glTF primitives → [`Mesh`]: attributes and triangles.
 
 use super::accessor::Elements;
-use super::Document;
+use super::{draco, Document};
 use crate::error::Result;
 use crate::scene::{Mesh, Scene};
-use ::gltf::json::mesh::{Mode, Primitive, Semantic};
+use ::gltf::json::mesh::{Mode, Primitive};
 use ::gltf::json::validation::Checked;
 use glam::Vec3;
 
@@ -32,7 +32,6 @@ impl Document<'_> {
 
     /// A primitive's triangles; `None`, with a warning, when it has none.
     fn primitive(&mut self, place: &str, primitive: &Primitive) -> Result<Option<Mesh>> {
-        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value());
         let mode = match primitive.mode {
             Checked::Valid(mode) => mode,
             Checked::Invalid => return Err(self.refuse(format!("{place}: its mode is unknown"))),
@@ -41,25 +40,19 @@ impl Document<'_> {
             self.warnings.add("left out: points or lines, only triangles are drawn");
             return Ok(None);
         }
-        let extension = |name: &str| primitive.extensions.as_ref().is_some_and(|all| all.others.contains_key(name));
-        if extension("KHR_draco_mesh_compression") {
-            self.warnings.add("ignored: KHR_draco_mesh_compression, the uncompressed fallback is drawn");
-        }
-        let Some(positions) = attribute(Semantic::Positions) else {
+        // Compressed ones are decoded to a list, whatever they were.
+        let mode = if draco::is_compressed(primitive) { Mode::Triangles } else { mode };
+        let Some(positions) = self.vectors(place, primitive, "POSITION", None)? else {
             self.warnings.add(format!("left out: {place} has no POSITION"));
             return Ok(None);
         };
         if primitive.targets.is_some() {
             self.warnings.add("ignored: morph targets, the base shape is drawn");
         }
-        let positions = self.vectors(place, "POSITION", positions, None)?;
         let count = positions.len();
-        let normals = attribute(Semantic::Normals).map(|index| self.vectors(place, "NORMAL", index, Some(count)));
-        let colors = attribute(Semantic::Colors(0)).map(|index| self.vectors(place, "COLOR_0", index, Some(count)));
-        let corners = match primitive.indices {
-            Some(index) => self.indices(index.value())?,
-            None => (0..count as u32).collect(),
-        };
+        let normals = self.vectors(place, primitive, "NORMAL", Some(count))?.unwrap_or_default();
+        let colors = self.vectors(place, primitive, "COLOR_0", Some(count))?.unwrap_or_default();
+        let corners = self.corners(primitive)?.unwrap_or_else(|| (0..count as u32).collect());
         if let Some(beyond) = corners.iter().find(|corner| **corner as usize >= count) {
             return Err(self.refuse(format!("{place}: index {beyond} lies beyond its {count} vertices")));
         }
@@ -67,7 +60,6 @@ impl Document<'_> {
         if triangles.is_empty() || (mode == Mode::Triangles && corners.len() % 3 != 0) {
             self.warnings.add(format!("dropped: {place} has {} corners, not whole triangles", corners.len()));
         }
-        let (normals, colors) = (normals.transpose()?.unwrap_or_default(), colors.transpose()?.unwrap_or_default());
         let in_range = |color: &Vec3| color.cmpge(Vec3::ZERO).all() && color.cmple(Vec3::ONE).all();
         if !colors.iter().all(in_range) {
             self.warnings.add(format!("{place}: COLOR_0 has values outside 0 to 1; they were clamped"));
@@ -82,9 +74,15 @@ impl Document<'_> {
     }
 
     /// An attribute of three components (or four, of which the last is dropped), `count` of them if given.
-    fn vectors(&self, place: &str, name: &str, accessor: usize, count: Option<usize>) -> Result<Vec<Vec3>> {
-        let refuse = |message: String| self.refuse(format!("{place}: {name} (accessors[{accessor}]) {message}"));
-        let Elements { components, values } = self.floats(accessor)?;
+    fn vectors(
+        &self,
+        place: &str,
+        primitive: &Primitive,
+        name: &str,
+        count: Option<usize>,
+    ) -> Result<Option<Vec<Vec3>>> {
+        let refuse = |message: String| self.refuse(format!("{place}: {name} {message}"));
+        let Some(Elements { components, values }) = self.attribute(primitive, name)? else { return Ok(None) };
         if components != 3 && !(components == 4 && name == "COLOR_0") {
             return Err(refuse(format!("has {components} components")));
         }
@@ -93,7 +91,7 @@ impl Document<'_> {
             Some(count) if vectors.len() != count => {
                 Err(refuse(format!("has {} elements, POSITION has {count}", vectors.len())))
             }
-            _ => Ok(vectors),
+            _ => Ok(Some(vectors)),
         }
     }
 }
