@@ -123,3 +123,104 @@ fn decode_unguarded(bytes: &[u8], most: u64) -> Result<Decoded, String> {
     };
     Ok(Decoded { corners, attributes: (0..mesh.num_attributes()).map(read).collect() })
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use crate::scene::gltf::tests::{bytes_of, corpus, hurt, with_document};
+
+    /// Four vertices with a colour each and two triangles, stored in sequence and by Edgebreaker.
+    const MESHES: [&str; 2] = [
+        "445241434f02020100000002040100010202010301020009030000020204000100010000000000000000000000000000803f0000000000\
+         000000000000000000803f000000000000803f0000803f0000003f0001010009030110012013011003009090698061c6bc5c0600000000\
+         ff000000",
+        "445241434f02020101000000040201020000011fff0111ff011102ff00000000000100090300000001020204000101000000000000803f\
+         000000000000803f00000000000000000000803f0000803f0000003f000000000000000000000000010101000903011001101301200300\
+         50914c62e6dc5c16e0bc0c0000000000ff000000",
+    ];
+
+    /// The corners' positions and colours, whatever the order of the vertices.
+    fn corners(decoded: &Decoded) -> Vec<(Vec<f32>, Vec<f32>)> {
+        let of = |number: u32, corner: u32| {
+            let Elements { components, values } = &decoded.attributes[&number];
+            values.chunks(*components).nth(corner as usize).unwrap().to_vec()
+        };
+        decoded.corners.iter().map(|corner| (of(0, *corner), of(1, *corner))).collect()
+    }
+
+    #[test]
+    fn both_methods_give_the_mesh() {
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.5]];
+        let colours =
+            [[255.0, 0.0, 0.0, 255.0], [0.0, 255.0, 0.0, 255.0], [0.0, 0.0, 255.0, 255.0], [51.0, 102.0, 153.0, 204.0]];
+        for text in MESHES {
+            let decoded = decode(&bytes_of(text), 1000).unwrap();
+            let own = corners(&decoded);
+            assert_eq!(own.len(), 6);
+            for vertex in 0..4 {
+                let vertex = (positions[vertex].to_vec(), colours[vertex].to_vec());
+                let times = own.iter().filter(|corner| **corner == vertex).count();
+                assert_eq!(times, if vertex.0[0] + vertex.0[1] == 1.0 { 2 } else { 1 }, "{vertex:?} in {own:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn hurt_data_are_answered() {
+        for text in MESHES {
+            let bytes = bytes_of(text);
+            // The last bytes are a transform that such attributes do not have.
+            for end in 0..bytes.len() - 16 {
+                assert!(decode(&bytes[..end], 1000).is_err(), "cut at {end} of {}", bytes.len());
+            }
+            hurt(&bytes, 500, |bytes| {
+                if let Ok(decoded) = decode(bytes, 10_000) {
+                    assert!(decoded.corners.len() <= 10_000);
+                }
+            });
+            assert!(decode(&bytes, 27).is_err(), "28 numbers of vertices are more than 27");
+        }
+    }
+
+    /// Every compressed primitive of the corpus: as many vertices and components as the accessors say, normals and weights
+    /// of length and sum 1; and each answers when its data are hurt.
+    #[test]
+    fn the_corpus_attributes() {
+        let Some(corpus) = corpus() else { return };
+        for model in ["Box", "CesiumMan", "RiggedFigure", "RiggedSimple", "MorphPrimitivesTest"] {
+            let path = corpus.join(format!("models/{model}/glTF-Draco/{model}.gltf"));
+            with_document(&path, |document| {
+                for primitive in document.root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+                    let indices = primitive.indices.unwrap().value();
+                    let corners = document.corners(primitive).unwrap().unwrap();
+                    assert_eq!(corners.len() as u64, document.root.accessors[indices].count.0, "{model}");
+                    for (semantic, accessor) in &primitive.attributes {
+                        let (name, accessor) = (semantic.to_string(), &document.root.accessors[accessor.value()]);
+                        let Elements { components, values } = document.attribute(primitive, &name).unwrap().unwrap();
+                        let Checked::Valid(shape) = accessor.type_ else { panic!("{model}: {name}") };
+                        assert_eq!(components, shape.multiplicity(), "{model}: {name}");
+                        assert_eq!(values.len() as u64, accessor.count.0 * components as u64, "{model}: {name}");
+                        assert!(corners.iter().all(|corner| u64::from(*corner) < accessor.count.0), "{model}");
+                        for element in values.chunks(components) {
+                            let (sum, squares) =
+                                (element.iter().sum::<f32>(), element.iter().map(|v| v * v).sum::<f32>());
+                            let fits = match name.as_str() {
+                                "NORMAL" => (squares - 1.0).abs() < 1e-3,
+                                "WEIGHTS_0" => (sum - 1.0).abs() < 1e-2,
+                                "JOINTS_0" => {
+                                    element.iter().all(|joint| (0.0..64.0).contains(joint) && joint.fract() == 0.0)
+                                }
+                                _ => element.iter().all(|value| value.is_finite()),
+                            };
+                            assert!(fits, "{model}: {name} {element:?}");
+                        }
+                    }
+                    let view = extension(primitive).unwrap()["bufferView"].as_u64().unwrap() as usize;
+                    hurt(document.view_bytes(view).unwrap(), 200, |bytes| drop(decode(bytes, 1 << 20)));
+                }
+            });
+        }
+    }
+}

@@ -37,6 +37,11 @@ pub(super) fn documents(corpus: &Path, mut visit: impl FnMut(&str, &Document)) {
     }
 }
 
+/// Bytes written as hexadecimal digits.
+pub(super) fn bytes_of(digits: &str) -> Vec<u8> {
+    (0..digits.len()).step_by(2).map(|at| u8::from_str_radix(&digits[at..at + 2], 16).unwrap()).collect()
+}
+
 /// Calls `read` with the data cut off at every byte (of long data, at 300 places) and with `times` random changes of up to
 /// four bytes, always the same ones.
 pub(super) fn hurt(bytes: &[u8], times: usize, mut read: impl FnMut(&[u8])) {

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
-use crate::scene::gltf::tests::{corpus, documents, hurt};
+use crate::scene::gltf::tests::{corpus, documents, hurt, with_document};
 use ::image::codecs::{jpeg::JpegEncoder, webp::WebPEncoder};
 use ::image::ExtendedColorType;
 
@@ -196,4 +196,16 @@ fn every_image_decodes() {
     });
     println!("images and their bytes by format: {formats:?}\nwarnings: {warnings:#?}");
     assert!(formats.keys().any(|format| format.contains("ETC1S")) && formats.contains_key("WebP"), "{formats:?}");
+}
+
+/// The smallest picture of the corpus in ETC1S, which no test can write.
+#[test]
+fn a_hurt_etc1s_picture_is_answered() {
+    let Some(corpus) = corpus() else { return };
+    with_document(&corpus.join("models/CesiumBalloonKTX2/CesiumBalloonKTX2.glb"), |document| {
+        let all = (0..document.root.images.len()).map(|index| document.image_bytes(index).unwrap());
+        let smallest = all.min_by_key(|bytes| bytes.len()).unwrap();
+        assert_eq!(decode(&smallest, None, MOST).unwrap().0.format, "KTX2 (ETC1S)");
+        hurt(&smallest, 300, |bytes| drop(decode(bytes, None, MOST)));
+    });
 }

@@ -97,3 +97,54 @@ fn color([y, co, cg, alpha]: [i32; 4], largest: f32) -> [f32; 4] {
     let rgba = [y + co - cg, y + cg, y - co - cg, low << 1 | low & 1];
     rgba.map(|value| (value as f32 * (largest / scale as f32)).round())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn undo<const N: usize>(filter: Filter, mut bytes: [u8; N]) -> [u8; N] {
+        assert!(filter.fits(N));
+        filter.undo(&mut bytes, N);
+        bytes
+    }
+
+    #[test]
+    fn values_worked_out_by_hand() {
+        assert_eq!(undo(Filter::None, [1, 2, 3, 4]), [1, 2, 3, 4]);
+        // X, Z and, with 1 stored in four bits, the middle between X and -Y. The fourth byte passes.
+        assert_eq!(undo(Filter::Octahedral, [127, 0, 127, 5]), [127, 0, 0, 5]);
+        assert_eq!(undo(Filter::Octahedral, [0, 0, 127, 5]), [0, 0, 127, 5]);
+        assert_eq!(undo(Filter::Octahedral, [8, (-8_i8) as u8, 16, 0]), [90, (-90_i8) as u8, 0, 0]);
+        let halves = |values: [i16; 4]| -> [u8; 8] {
+            let mut bytes = [0; 8];
+            (0..4).for_each(|i| set_word(&mut bytes, i, values[i] as u16));
+            bytes
+        };
+        // Beyond the equator both coordinates are folded.
+        assert_eq!(undo(Filter::Octahedral, halves([32767, 32767, 32767, -9])), halves([0, 0, -32767, -9]));
+        assert_eq!(undo(Filter::Quaternion, halves([0, 0, 0, 32767])), halves([0, 0, 0, 32767]));
+        assert_eq!(undo(Filter::Quaternion, halves([32767, 0, 0, 32764])), halves([23170, 23170, 0, 0]));
+        assert_eq!(undo(Filter::Exponential, (-1 << 24 | 3_i32).to_le_bytes()), 1.5_f32.to_le_bytes());
+        assert_eq!(
+            undo(Filter::Exponential, (100 << 24 | 0xff_ffff_i32).to_le_bytes()),
+            (-2_f32.powi(100)).to_le_bytes()
+        );
+        assert_eq!(undo(Filter::Color, [100, 10, 20, 0xff]), [90, 120, 70, 255]);
+        // Four bits of colour, three of alpha.
+        assert_eq!(undo(Filter::Color, [15, 0, 0, 0b1000]), [255, 255, 255, 0]);
+        assert!(!Filter::Quaternion.fits(4) && !Filter::Color.fits(12) && Filter::Exponential.fits(12));
+    }
+
+    /// Values that no compressor writes.
+    #[test]
+    fn zeros_and_ones_are_answered() {
+        for filter in [Filter::Octahedral, Filter::Quaternion, Filter::Exponential, Filter::Color] {
+            for byte in [0, 0x7f, 0x80, 0xff] {
+                undo(filter, [byte; 8]);
+                if filter.fits(4) {
+                    undo(filter, [byte; 4]);
+                }
+            }
+        }
+    }
+}

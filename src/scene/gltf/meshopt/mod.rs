@@ -120,3 +120,6 @@ fn decompress_one(extension: &Value, buffers: &[Result<Vec<u8>, String>], left: 
         Mode::Indices => indices::decode_indices(bytes, count, stride),
     }
 }
+
+#[cfg(test)]
+mod tests;
