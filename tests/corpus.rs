@@ -205,3 +205,63 @@ fn invalid_files_are_refused_or_warned_of() {
     println!("{} files: {counts:?}\nsilent: {silent:#?}", reports.len());
     assert!(silent.iter().all(|path| path.contains("/image/")), "{silent:#?}");
 }
+
+/// The corners of all triangles in world space, sorted, and the mean of all.
+fn corners(scene: &Scene) -> (Vec<DVec3>, DVec3) {
+    let mut all = Vec::new();
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh];
+        let place = |vertex: &u32| instance.world_from_object.transform_point3(mesh.positions[*vertex as usize].into());
+        all.extend(mesh.triangles.iter().flatten().map(place));
+    }
+    let sum: DVec3 = all.iter().sum();
+    let mean = sum / all.len() as f64;
+    (all, mean)
+}
+
+/// Compressed models against the same ones uncompressed: as many triangles, no corner lost, extents and mean alike up to
+/// the steps of quantisation (2 to the power of -11 of the extent).
+#[test]
+fn compressed_models_are_the_uncompressed_ones() {
+    let Some(corpus) = corpus() else { return };
+    let pairs = [
+        ("Box/glTF-Draco/Box.gltf", "Box/glTF/Box.gltf"),
+        ("CesiumMan/glTF-Draco/CesiumMan.gltf", "CesiumMan/glTF/CesiumMan.gltf"),
+        ("RiggedFigure/glTF-Draco/RiggedFigure.gltf", "RiggedFigure/glTF/RiggedFigure.gltf"),
+        ("RiggedSimple/glTF-Draco/RiggedSimple.gltf", "RiggedSimple/glTF/RiggedSimple.gltf"),
+        (
+            "MorphPrimitivesTest/glTF-Draco/MorphPrimitivesTest.gltf",
+            "MorphPrimitivesTest/glTF/MorphPrimitivesTest.gltf",
+        ),
+        ("Box/meshopt-glb/BoxMeshopt.glb", "Box/glTF/Box.gltf"),
+        ("BoxTextured/meshopt/BoxTextured_meshopt.glb", "BoxTextured/glTF/BoxTextured.gltf"),
+    ];
+    println!("{:<58} triangles vertices  extent error  mean error  farthest corner", "model");
+    for (compressed, plain) in pairs {
+        let scenes = [compressed, plain].map(|path| load(&corpus.join("models").join(path)).unwrap());
+        let [own, other] = scenes.each_ref().map(corners);
+        let bounds = |all: &[DVec3]| all.iter().fold((all[0], all[0]), |(a, b), p| (a.min(*p), b.max(*p)));
+        let ((low, high), (other_low, other_high)) = (bounds(&own.0), bounds(&other.0));
+        let extent = (other_high - other_low).max_element();
+        let bounds_error = low.distance(other_low).max(high.distance(other_high)) / extent;
+        let mean_error = own.1.distance(other.1) / extent;
+        let nearest = |p: &DVec3, all: &[DVec3]| all.iter().map(|q| p.distance(*q)).fold(f64::INFINITY, f64::min);
+        // Both ways, for a part of the corners.
+        let step = own.0.len().div_ceil(300);
+        let farthest = |a: &[DVec3], b: &[DVec3]| a.iter().step_by(step).map(|p| nearest(p, b)).fold(0.0, f64::max);
+        let far = farthest(&own.0, &other.0).max(farthest(&other.0, &own.0)) / extent;
+        let vertices =
+            scenes.each_ref().map(|scene| scene.meshes.iter().map(|mesh| mesh.positions.len()).sum::<usize>());
+        println!(
+            "{compressed:<58} {:>9} {:>4}/{:<4} {bounds_error:>12.2e} {mean_error:>11.2e} {far:>10.2e}",
+            own.0.len() / 3,
+            vertices[0],
+            vertices[1]
+        );
+        assert_eq!(own.0.len(), other.0.len(), "{compressed}");
+        let most = 1.0 / 2048.0;
+        assert!(bounds_error < most && mean_error < most && far < most, "{compressed}");
+        let decoder = ["Draco", "meshopt"].iter().find(|word| scenes[0].warnings.iter().any(|w| w.contains(*word)));
+        assert!(decoder.is_none(), "{compressed}: {:?}", scenes[0].warnings);
+    }
+}

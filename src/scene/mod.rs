@@ -28,6 +28,7 @@ mod teapot;
 mod texture;
 mod view;
 
+pub use self::image::{Image, Pixels};
 pub use background::Background;
 pub use builtin::{built_in, BUILT_IN};
 pub use camera::{Camera, CameraChoice, Projection};

@@ -13,6 +13,7 @@ const MOST_NUMBERS: u64 = 1 << 29;
 const MOST_CHECKED: u64 = 1 << 28;
 
 /// Values of an accessor, `components` to an element.
+#[derive(Clone)]
 pub(super) struct Elements<T> {
     pub components: usize,
     pub values: Vec<T>,
@@ -78,7 +79,16 @@ impl Document<'_> {
 
     /// Takes an accessor's numbers from what the document may still allocate.
     fn spend(&self, index: usize) -> Result<()> {
-        let spent = self.spent.get().saturating_add(self.numbers(index));
+        self.spend_numbers(self.numbers(index))
+    }
+
+    /// Numbers that the document may still allocate.
+    pub fn numbers_left(&self) -> u64 {
+        MOST_NUMBERS.saturating_sub(self.spent.get())
+    }
+
+    pub fn spend_numbers(&self, numbers: u64) -> Result<()> {
+        let spent = self.spent.get().saturating_add(numbers);
         self.spent.set(spent);
         if spent > MOST_NUMBERS {
             return Err(self.refuse("its meshes have more data than 2 GiB"));
@@ -183,13 +193,7 @@ impl Document<'_> {
                 "bufferViews[{view_index}].byteStride {stride} is less than an element's {element} bytes"
             )));
         }
-        let start = view.byte_offset.map_or(0, |offset| offset.0);
-        let bytes = self.buffers[view.buffer.value()].as_ref().map_err(|fault| refuse(fault.clone()))?;
-        let whole = usize::try_from(start).ok().zip(usize::try_from(view.byte_length.0).ok());
-        let view_bytes = whole.and_then(|(start, length)| bytes.get(start..start.checked_add(length)?));
-        let view_bytes = view_bytes.ok_or_else(|| {
-            refuse(format!("bufferViews[{view_index}] does not fit into buffers[{}]", view.buffer.value()))
-        })?;
+        let view_bytes = self.view_bytes(view_index).map_err(refuse)?;
         let needed = count
             .checked_sub(1)
             .and_then(|steps| steps.checked_mul(stride as u64)?.checked_add(element as u64)?.checked_add(offset));

@@ -1,6 +1,6 @@
 //! Content of buffers: the BIN chunk, data URIs, files beside the document.
 
-use super::Warnings;
+use super::{meshopt, Document, Warnings};
 use ::gltf::json::{Buffer, Root};
 use base64::{engine::general_purpose, Engine};
 use std::path::{Component, Path};
@@ -16,13 +16,15 @@ pub(super) fn load(
     folder: Option<&Path>,
     warnings: &mut Warnings,
 ) -> Vec<Result<Vec<u8>, String>> {
+    let fallbacks = meshopt::fallbacks(root, binary.is_some());
     let mut buffers = Vec::new();
     for (index, buffer) in root.buffers.iter().enumerate() {
         let binary = binary.filter(|_| index == 0);
-        let bytes = load_one(buffer, binary).and_then(|bytes| match bytes {
-            Some(bytes) => Ok(bytes),
-            None => read_beside(buffer.uri.as_deref().unwrap_or_default(), folder),
-        });
+        if fallbacks[index] {
+            buffers.push(Err(format!("buffers[{index}] only stands in for compressed data")));
+            continue;
+        }
+        let bytes = load_one(buffer, binary, folder);
         let declared = buffer.byte_length.0;
         let bytes = bytes.and_then(|bytes| match bytes.len() as u64 {
             length if length < declared => Err(format!("byteLength is {declared}, but there are only {length} bytes")),
@@ -48,16 +50,50 @@ pub(super) fn load(
     buffers
 }
 
-/// The bytes of a buffer that is part of the document; `None` for one in a file of its own.
-fn load_one(buffer: &Buffer, binary: Option<&[u8]>) -> Result<Option<Vec<u8>>, String> {
+impl Document<'_> {
+    /// The bytes of a buffer view, decompressed if they are compressed.
+    pub fn view_bytes(&self, index: usize) -> Result<&[u8], String> {
+        if let Some(decompressed) = self.decompressed.get(&index) {
+            return decompressed.as_deref().map_err(Clone::clone);
+        }
+        let view = self.root.buffer_views.get(index).ok_or_else(|| format!("there is no bufferViews[{index}]"))?;
+        let offset = view.byte_offset.map_or(0, |offset| offset.0);
+        slice(&self.buffers, view.buffer.value(), offset, view.byte_length.0)
+            .map_err(|fault| format!("bufferViews[{index}]: {fault}"))
+    }
+}
+
+/// Bytes of a buffer from `offset` on.
+pub(super) fn slice(
+    buffers: &[Result<Vec<u8>, String>],
+    buffer: usize,
+    offset: u64,
+    length: u64,
+) -> Result<&[u8], String> {
+    let bytes = buffers.get(buffer).ok_or_else(|| format!("there is no buffers[{buffer}]"))?;
+    let bytes = bytes.as_ref().map_err(Clone::clone)?;
+    let whole = usize::try_from(offset).ok().zip(usize::try_from(length).ok());
+    let part = whole.and_then(|(offset, length)| bytes.get(offset..offset.checked_add(length)?));
+    part.ok_or_else(|| format!("{length} bytes from {offset} on do not fit into buffers[{buffer}]"))
+}
+
+fn load_one(buffer: &Buffer, binary: Option<&[u8]>, folder: Option<&Path>) -> Result<Vec<u8>, String> {
     match (&buffer.uri, binary) {
         _ if buffer.byte_length.0 == 0 || buffer.byte_length.0 > LARGEST => {
             Err(format!("byteLength {} is not a sensible length", buffer.byte_length.0))
         }
-        (Some(uri), _) if uri.starts_with("data:") => decode_data_uri(uri).map(Some),
-        (Some(_), _) => Ok(None),
-        (None, Some(binary)) => Ok(Some(binary.to_vec())),
+        (Some(uri), _) => from_uri(uri, folder),
+        (None, Some(binary)) => Ok(binary.to_vec()),
         (None, None) => Err("it has no uri, and there is no BIN chunk for it".into()),
+    }
+}
+
+/// The bytes that a URI of the document holds or names.
+pub(super) fn from_uri(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
+    if uri.starts_with("data:") {
+        decode_data_uri(uri)
+    } else {
+        read_beside(uri, folder)
     }
 }
 

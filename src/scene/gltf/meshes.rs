@@ -1,10 +1,10 @@
 //! glTF primitives → [`Mesh`]: attributes and triangles.
 
 use super::accessor::Elements;
-use super::Document;
+use super::{draco, Document};
 use crate::error::Result;
 use crate::scene::{Mesh, Scene};
-use ::gltf::json::mesh::{Mode, Primitive, Semantic};
+use ::gltf::json::mesh::{Mode, Primitive};
 use ::gltf::json::validation::Checked;
 use glam::{Vec2, Vec3, Vec4};
 
@@ -32,7 +32,6 @@ impl Document<'_> {
 
     /// A primitive's triangles; `None`, with a warning, when it has none.
     fn primitive(&mut self, place: &str, primitive: &Primitive) -> Result<Option<Mesh>> {
-        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value());
         let mode = match primitive.mode {
             Checked::Valid(mode) => mode,
             Checked::Invalid => return Err(self.refuse(format!("{place}: its mode is unknown"))),
@@ -41,28 +40,22 @@ impl Document<'_> {
             self.warnings.add("left out: points or lines, only triangles are drawn");
             return Ok(None);
         }
-        let extension = |name: &str| primitive.extensions.as_ref().is_some_and(|all| all.others.contains_key(name));
-        if extension("KHR_draco_mesh_compression") {
-            self.warnings.add("ignored: KHR_draco_mesh_compression, the uncompressed fallback is drawn");
-        }
-        let Some(positions) = attribute(Semantic::Positions) else {
+        // Compressed ones are decoded to a list, whatever they were.
+        let mode = if draco::is_compressed(primitive) { Mode::Triangles } else { mode };
+        let Some(positions) = self.vectors(place, primitive, "POSITION", None)? else {
             self.warnings.add(format!("left out: {place} has no POSITION"));
             return Ok(None);
         };
         if primitive.targets.is_some() {
             self.warnings.add("ignored: morph targets, the base shape is drawn");
         }
-        let positions = self.vectors(place, "POSITION", positions, None)?;
         let count = positions.len();
-        let normals = attribute(Semantic::Normals).map(|index| self.vectors(place, "NORMAL", index, Some(count)));
-        let colors = attribute(Semantic::Colors(0)).map(|index| self.colors(place, index, count));
-        let texcoord = |set| attribute(Semantic::TexCoords(set)).map(|index| self.texcoords(place, set, index, count));
-        let (first, second) = (texcoord(0).transpose()?, texcoord(1).transpose()?);
-        let tangents = attribute(Semantic::Tangents).map(|index| self.tangents(place, index, count)).transpose()?;
-        let corners = match primitive.indices {
-            Some(index) => self.indices(index.value())?,
-            None => (0..count as u32).collect(),
-        };
+        let normals = self.vectors(place, primitive, "NORMAL", Some(count))?.unwrap_or_default();
+        let colors = self.colors(place, primitive, count)?;
+        let (first, second) =
+            (self.texcoords(place, primitive, 0, count)?, self.texcoords(place, primitive, 1, count)?);
+        let tangents = self.tangents(place, primitive, count)?;
+        let corners = self.corners(primitive)?.unwrap_or_else(|| (0..count as u32).collect());
         if let Some(beyond) = corners.iter().find(|corner| **corner as usize >= count) {
             return Err(self.refuse(format!("{place}: index {beyond} lies beyond its {count} vertices")));
         }
@@ -70,7 +63,6 @@ impl Document<'_> {
         if triangles.is_empty() || (mode == Mode::Triangles && corners.len() % 3 != 0) {
             self.warnings.add(format!("dropped: {place} has {} corners, not whole triangles", corners.len()));
         }
-        let (normals, colors) = (normals.transpose()?.unwrap_or_default(), colors.transpose()?.unwrap_or_default());
         let in_range = |color: &Vec4| color.cmpge(Vec4::ZERO).all() && color.cmple(Vec4::ONE).all();
         if !colors.iter().all(in_range) {
             self.warnings.add(format!("{place}: COLOR_0 has values outside 0 to 1; they were clamped"));
@@ -88,47 +80,53 @@ impl Document<'_> {
         }))
     }
 
-    /// Elements of an attribute, `count` of them, of as many components as allowed.
-    fn attribute(
+    /// Elements of an attribute if there is one, `count` of them, of as many components as allowed.
+    fn checked(
         &self,
         place: &str,
+        primitive: &Primitive,
         name: &str,
-        accessor: usize,
         components: &[usize],
         count: usize,
-    ) -> Result<Elements<f32>> {
-        let elements = self.floats(accessor)?;
-        let refuse = |message: String| Err(self.refuse(format!("{place}: {name} (accessors[{accessor}]) {message}")));
+    ) -> Result<Option<Elements<f32>>> {
+        let Some(elements) = self.attribute(primitive, name)? else { return Ok(None) };
+        let refuse = |message: String| Err(self.refuse(format!("{place}: {name} {message}")));
         if !components.contains(&elements.components) {
             return refuse(format!("has {} components", elements.components));
         }
         match elements.values.len() / elements.components {
             own if own != count => refuse(format!("has {own} elements, POSITION has {count}")),
-            _ => Ok(elements),
+            _ => Ok(Some(elements)),
         }
     }
 
     /// Colours; alpha is 1 where there is none.
-    fn colors(&self, place: &str, accessor: usize, count: usize) -> Result<Vec<Vec4>> {
-        let Elements { components, values } = self.attribute(place, "COLOR_0", accessor, &[3, 4], count)?;
+    fn colors(&self, place: &str, primitive: &Primitive, count: usize) -> Result<Vec<Vec4>> {
+        let Some(elements) = self.checked(place, primitive, "COLOR_0", &[3, 4], count)? else { return Ok(Vec::new()) };
         let color = |own: &[f32]| Vec4::new(own[0], own[1], own[2], own.get(3).copied().unwrap_or(1.0));
-        Ok(values.chunks_exact(components).map(color).collect())
+        Ok(elements.values.chunks_exact(elements.components).map(color).collect())
     }
 
-    fn texcoords(&self, place: &str, set: u32, accessor: usize, count: usize) -> Result<Vec<Vec2>> {
-        let elements = self.attribute(place, &format!("TEXCOORD_{set}"), accessor, &[2], count)?;
-        Ok(elements.values.chunks_exact(2).map(Vec2::from_slice).collect())
+    fn texcoords(&self, place: &str, primitive: &Primitive, set: u32, count: usize) -> Result<Option<Vec<Vec2>>> {
+        let elements = self.checked(place, primitive, &format!("TEXCOORD_{set}"), &[2], count)?;
+        Ok(elements.map(|elements| elements.values.chunks_exact(2).map(Vec2::from_slice).collect()))
     }
 
-    fn tangents(&self, place: &str, accessor: usize, count: usize) -> Result<Vec<Vec4>> {
-        let elements = self.attribute(place, "TANGENT", accessor, &[4], count)?;
-        Ok(elements.values.chunks_exact(4).map(Vec4::from_slice).collect())
+    fn tangents(&self, place: &str, primitive: &Primitive, count: usize) -> Result<Option<Vec<Vec4>>> {
+        let elements = self.checked(place, primitive, "TANGENT", &[4], count)?;
+        Ok(elements.map(|elements| elements.values.chunks_exact(4).map(Vec4::from_slice).collect()))
     }
 
     /// An attribute of three components, `count` of them if given.
-    fn vectors(&self, place: &str, name: &str, accessor: usize, count: Option<usize>) -> Result<Vec<Vec3>> {
-        let refuse = |message: String| self.refuse(format!("{place}: {name} (accessors[{accessor}]) {message}"));
-        let Elements { components, values } = self.floats(accessor)?;
+    fn vectors(
+        &self,
+        place: &str,
+        primitive: &Primitive,
+        name: &str,
+        count: Option<usize>,
+    ) -> Result<Option<Vec<Vec3>>> {
+        let refuse = |message: String| self.refuse(format!("{place}: {name} {message}"));
+        let Some(Elements { components, values }) = self.attribute(primitive, name)? else { return Ok(None) };
         if components != 3 {
             return Err(refuse(format!("has {components} components")));
         }
@@ -137,7 +135,7 @@ impl Document<'_> {
             Some(count) if vectors.len() != count => {
                 Err(refuse(format!("has {} elements, POSITION has {count}", vectors.len())))
             }
-            _ => Ok(vectors),
+            _ => Ok(Some(vectors)),
         }
     }
 }

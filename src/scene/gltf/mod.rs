@@ -1,8 +1,8 @@
 //! glTF 2.0 → [`Scene`].
 //!
 //! ```text
-//! bytes ─ container ─→ JSON ─ check ─→ typed JSON (gltf crate) ─ buffers ─→ bytes of accessors
-//!                      nodes ─→ instances, cameras, lights;  primitives ─→ meshes;  materials
+//! bytes ─ container ─→ JSON ─ check ─→ typed JSON (gltf crate) ─ buffers, meshopt ─→ bytes of accessors
+//!                      nodes ─→ instances, cameras, lights;  primitives, draco ─→ meshes;  images;  materials
 //! ```
 //! Nothing is trusted: every index, size and count is checked against what is there before it is used. A fault that
 //! leaves no sensible picture refuses the file; any other, and everything that is not shown, becomes a warning.
@@ -11,8 +11,13 @@ mod accessor;
 mod buffers;
 mod check;
 mod container;
+mod draco;
+// Until materials have textures.
+#[allow(dead_code)]
+mod images;
 mod materials;
 mod meshes;
+mod meshopt;
 mod nodes;
 mod textures;
 
@@ -20,18 +25,22 @@ use super::Scene;
 use crate::error::{Error, Result};
 use ::gltf::json::Root;
 use serde_json::Value;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
+use std::rc::Rc;
 
 /// Extensions that are shown exactly.
-pub const SUPPORTED_EXTENSIONS: [&str; 5] = [
+pub const SUPPORTED_EXTENSIONS: [&str; 8] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
 ];
 
 /// Reads a scene from a `.gltf` or `.glb` file, or from standard input for `-` (then without files beside it).
@@ -71,7 +80,7 @@ pub fn parse(
 ) -> Result<Scene> {
     let container = container::split(bytes).map_err(|message| Error::content(file, message))?;
     let mut document = Document::new(container, file)?;
-    document.buffers = buffers::load(&document.root, container.binary, folder, &mut document.warnings);
+    document.load(container.binary, folder);
     document.check_data();
     document.note_what_is_not_shown();
     let mut scene = Scene { name, ..Scene::default() };
@@ -91,6 +100,12 @@ struct Document<'a> {
     root: Root,
     /// Content of each buffer, or why there is none.
     buffers: Vec<Result<Vec<u8>, String>>,
+    /// Content of the buffer views that are compressed.
+    decompressed: meshopt::Decompressed,
+    /// The compressed mesh that was read last: its attributes are asked for one by one.
+    mesh: RefCell<Option<(usize, Rc<draco::Decoded>)>>,
+    /// Where files lie that the document names.
+    folder: Option<&'a Path>,
     warnings: Warnings,
     /// Numbers that accessors have been expanded to.
     spent: Cell<u64>,
@@ -114,7 +129,24 @@ impl<'a> Document<'a> {
             raw.insert(name.into(), value.get(name).cloned().unwrap_or_default());
         }
         let root = typed(container.json, value).map_err(|error| refuse(format!("not a glTF document: {error}")))?;
-        Ok(Self { file, root, buffers: Vec::new(), warnings, spent: Cell::new(0), raw: Value::Object(raw) })
+        Ok(Self {
+            file,
+            root,
+            buffers: Vec::new(),
+            decompressed: BTreeMap::new(),
+            mesh: RefCell::new(None),
+            folder: None,
+            warnings,
+            spent: Cell::new(0),
+            raw: Value::Object(raw),
+        })
+    }
+
+    /// Loads all buffers and decompresses what is compressed.
+    fn load(&mut self, binary: Option<&[u8]>, folder: Option<&'a Path>) {
+        self.folder = folder;
+        self.buffers = buffers::load(&self.root, binary, folder, &mut self.warnings);
+        self.decompressed = meshopt::decompress(&self.root, &self.buffers, &mut self.warnings);
     }
 
     /// A list of the document as it is in the file.
@@ -161,6 +193,9 @@ fn typed(json: &[u8], mut value: Value) -> serde_json::Result<Root> {
         serde_json::from_str(&value.to_string())
     })
 }
+
+#[cfg(test)]
+mod tests;
 
 /// Warnings, each text once with the number of times it was given.
 #[derive(Default)]

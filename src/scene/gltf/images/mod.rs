@@ -1,0 +1,113 @@
+//! glTF images → [`Image`]: where their bytes lie, and their formats.
+
+mod ktx2;
+
+use super::{buffers, Document};
+use crate::scene::{Image, Pixels};
+use ::image::{ColorType, ImageDecoder, ImageFormat, ImageReader, Limits};
+use std::borrow::Cow;
+use std::io::Cursor;
+
+/// Memory that a decoder may take beside its picture.
+const DECODER_BYTES: u64 = 1 << 28;
+
+impl Document<'_> {
+    /// The bytes of image `index`, as its file has them.
+    pub(super) fn image_bytes(&self, index: usize) -> Result<Cow<'_, [u8]>, String> {
+        let image = self.root.images.get(index).ok_or_else(|| format!("there is no images[{index}]"))?;
+        let bytes = match (&image.buffer_view, &image.uri) {
+            (Some(view), _) => self.view_bytes(view.value()).map(Cow::Borrowed),
+            (None, Some(uri)) => buffers::from_uri(uri, self.folder).map(Cow::Owned),
+            (None, None) => Err("it has neither a bufferView nor a uri".into()),
+        };
+        bytes.map_err(|fault| format!("images[{index}]: {fault}"))
+    }
+
+    /// The media type that the document says image `index` has.
+    pub(super) fn image_media_type(&self, index: usize) -> Option<&str> {
+        let image = self.root.images.get(index)?;
+        let in_uri = || image.uri.as_deref()?.strip_prefix("data:")?.split([';', ',']).next();
+        image.mime_type.as_ref().map(|kind| kind.0.as_str()).or_else(in_uri)
+    }
+}
+
+/// Decodes a picture of at most `most_pixels`, checked before anything is decoded. Its format is what its first bytes say; the
+/// second part of the answer is a warning when that is not its `media_type`. Its name is left empty.
+pub(super) fn decode(
+    bytes: &[u8],
+    media_type: Option<&str>,
+    most_pixels: u64,
+) -> Result<(Image, Option<String>), String> {
+    let ordinary = |format: ImageFormat, name: &str| decode_ordinary(bytes, format, name, most_pixels);
+    let (own_type, image) = match bytes {
+        [0x89, b'P', b'N', b'G', ..] => ("image/png", guarded(|| ordinary(ImageFormat::Png, "PNG"))),
+        [0xff, 0xd8, 0xff, ..] => ("image/jpeg", guarded(|| ordinary(ImageFormat::Jpeg, "JPEG"))),
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => {
+            ("image/webp", guarded(|| ordinary(ImageFormat::WebP, "WebP")))
+        }
+        [0xab, b'K', b'T', b'X', b' ', b'2', b'0', 0xbb, ..] => {
+            ("image/ktx2", guarded(|| ktx2::decode(bytes, most_pixels)))
+        }
+        _ => return Err("it is none of PNG, JPEG, WebP and KTX2".into()),
+    };
+    let image = image?;
+    let other = media_type.filter(|declared| !declared.eq_ignore_ascii_case(own_type));
+    Ok((image, other.map(|declared| format!("it is {own_type}, but declared as {declared}"))))
+}
+
+/// Runs a decoder. Another's code at work on what anybody may have written: should it panic, that is one more fault of the
+/// file and no end of the program.
+fn guarded(decode: impl FnOnce() -> Result<Image, String> + std::panic::UnwindSafe) -> Result<Image, String> {
+    std::panic::catch_unwind(decode).unwrap_or_else(|_| Err("the decoder cannot read it".into()))
+}
+
+/// `Err` for a picture of no or of too many pixels.
+fn check_size(width: u32, height: u32, most_pixels: u64) -> Result<(), String> {
+    match u64::from(width) * u64::from(height) {
+        0 => Err(format!("{width} × {height} is no size")),
+        pixels if pixels > most_pixels => Err(format!("{width} × {height} is more than {most_pixels} pixels")),
+        _ => Ok(()),
+    }
+}
+
+/// What the `image` crate decodes. It expands palettes, bits and transparent colours, and applies neither gamma nor profiles.
+fn decode_ordinary(bytes: &[u8], format: ImageFormat, name: &str, most_pixels: u64) -> Result<Image, String> {
+    let broken = |error: ::image::ImageError| format!("{name}: {error}");
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(most_pixels.saturating_mul(8).saturating_add(DECODER_BYTES));
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(broken)?;
+    let (width, height) = decoder.dimensions();
+    check_size(width, height, most_pixels)?;
+    let kind = decoder.color_type();
+    let size = usize::try_from(decoder.total_bytes()).map_err(|error| error.to_string())?;
+    let mut raw = vec![0; size];
+    decoder.read_image(&mut raw).map_err(broken)?;
+    let pixels = match kind {
+        ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
+            Pixels::Rgba8(spread(&raw, kind.channel_count(), u8::MAX))
+        }
+        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
+            let words: Vec<u16> = raw.chunks_exact(2).map(|pair| u16::from_ne_bytes([pair[0], pair[1]])).collect();
+            Pixels::Rgba16(spread(&words, kind.channel_count(), u16::MAX))
+        }
+        other => return Err(format!("{name}: pixels of type {other:?} are not known")),
+    };
+    Ok(Image { name: String::new(), format: name.into(), width, height, pixels, bytes: bytes.len() })
+}
+
+/// Pixels of one to four components: grey for all colours, `opaque` for an alpha that is not there.
+fn spread<T: Copy>(values: &[T], components: u8, opaque: T) -> Vec<[T; 4]> {
+    let pixel = |values: &[T]| match *values {
+        [grey] => [grey, grey, grey, opaque],
+        [grey, alpha] => [grey, grey, grey, alpha],
+        [red, green, blue] => [red, green, blue, opaque],
+        [red, green, blue, alpha] => [red, green, blue, alpha],
+        _ => [opaque; 4],
+    };
+    values.chunks_exact(components.into()).map(pixel).collect()
+}
+
+#[cfg(test)]
+mod tests;
