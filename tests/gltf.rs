@@ -53,7 +53,7 @@ impl Builder {
 }
 
 fn read(document: &Value) -> Result<Scene> {
-    gltf::parse(document.to_string().as_bytes(), "test".into(), "test.gltf", None, None)
+    gltf::parse(document.to_string().as_bytes(), "test".into(), "test.gltf", None, &gltf::ReadOptions::default())
 }
 
 const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
@@ -305,7 +305,7 @@ fn hostile_bytes_are_refused_without_panic() {
         glb.extend(json);
         glb
     };
-    let parse = |bytes: &[u8]| gltf::parse(bytes, "test".into(), "test.glb", None, None);
+    let parse = |bytes: &[u8]| gltf::parse(bytes, "test".into(), "test.glb", None, &gltf::ReadOptions::default());
     assert!(parse(&scene()).is_ok());
     for end in 0..scene().len() {
         assert!(parse(&scene()[..end]).is_err(), "cut at {end}");

@@ -4,6 +4,7 @@ use super::Document;
 use crate::error::Result;
 use ::gltf::json::accessor::{ComponentType, Type};
 use ::gltf::json::{buffer, validation::Checked, Index};
+use glam::{DMat4, Mat4};
 
 /// Most elements of an accessor that no buffer view backs: there the count alone decides what is allocated.
 const MOST_UNBACKED: u64 = 1 << 20;
@@ -76,6 +77,29 @@ impl Document<'_> {
         Ok(elements.values)
     }
 
+    /// Elements of an accessor of four-component unsigned integers: the joints of each vertex.
+    pub fn joints(&self, index: usize) -> Result<Vec<u32>> {
+        self.spend(index)?;
+        let elements = self.read(index, 0, integer)?;
+        let kind = &self.root.accessors[index].component_type;
+        let fits = matches!(kind, Checked::Valid(kind) if matches!(kind.0, ComponentType::U8 | ComponentType::U16));
+        if elements.components != 4 || !fits {
+            return Err(self.refuse(format!("accessors[{index}]: joints must be four unsigned integers of 8 or 16 bits")));
+        }
+        Ok(elements.values)
+    }
+
+    /// Elements of an accessor of 4 × 4 float matrices, column-major.
+    pub fn matrices(&self, index: usize) -> Result<Vec<DMat4>> {
+        let kind = &self.root.accessors[index].component_type;
+        let is_float = matches!(kind, Checked::Valid(kind) if kind.0 == ComponentType::F32);
+        let Elements { components, values } = self.floats(index)?;
+        if components != 16 || !is_float {
+            return Err(self.refuse(format!("accessors[{index}]: matrices must be MAT4 of floats")));
+        }
+        Ok(values.chunks_exact(16).map(|columns| Mat4::from_cols_slice(columns).as_dmat4()).collect())
+    }
+
     /// Takes an accessor's numbers from what the document may still allocate.
     fn spend(&self, index: usize) -> Result<()> {
         let spent = self.spent.get().saturating_add(self.numbers(index));
@@ -141,8 +165,9 @@ impl Document<'_> {
             return Err(refuse("its type or component type is unknown"));
         };
         let (kind, components) = (kind.0, shape.multiplicity());
-        if matches!(shape, Type::Mat2 | Type::Mat3 | Type::Mat4) {
-            return Err(refuse("matrices are not read here"));
+        // Their columns may be padded to 4 bytes; those of MAT4 never are.
+        if matches!(shape, Type::Mat2 | Type::Mat3) {
+            return Err(refuse("matrices of 2 or 3 columns are not read"));
         }
         let element = kind.size() * components;
         let values = match accessor.buffer_view {

@@ -1,6 +1,8 @@
 //! glTF primitives → [`Mesh`]: attributes and triangles.
 
 use super::accessor::Elements;
+use super::pose::Shape;
+use super::skin::Influences;
 use super::Document;
 use crate::error::Result;
 use crate::scene::{Mesh, Scene};
@@ -9,10 +11,15 @@ use ::gltf::json::validation::Checked;
 use glam::Vec3;
 
 impl Document<'_> {
-    /// Adds every primitive that can be drawn; answers, for each glTF mesh, the indices of what it became.
-    pub fn add_meshes(&mut self, scene: &mut Scene) -> Result<Vec<Vec<usize>>> {
+    /// Adds every primitive that can be drawn, with the materials of a variant; answers, for each glTF mesh, the indices of
+    /// what it became, and for each of these what can change its shape.
+    pub fn add_meshes(&mut self, scene: &mut Scene, variant: Option<usize>) -> Result<(Vec<Vec<usize>>, Vec<Shape>)> {
         let default_material = scene.materials.len() - 1;
-        let mut of_mesh = Vec::new();
+        let (mut of_mesh, mut shapes) = (Vec::new(), Vec::new());
+        let mut is_skinned = vec![false; self.root.meshes.len()];
+        for mesh in self.root.nodes.iter().filter_map(|node| node.skin.and(node.mesh)) {
+            is_skinned[mesh.value()] = true;
+        }
         for index in 0..self.root.meshes.len() {
             let mut indices = Vec::new();
             let count = self.root.meshes[index].primitives.len();
@@ -20,14 +27,25 @@ impl Document<'_> {
                 let place = format!("meshes[{index}].primitives[{part}]");
                 let primitive = self.root.meshes[index].primitives[part].clone();
                 let Some(mut mesh) = self.primitive(&place, &primitive)? else { continue };
-                mesh.name = self.root.meshes[index].name.clone().unwrap_or(place);
-                mesh.material = primitive.material.map_or(default_material, |material| material.value());
+                mesh.name = self.root.meshes[index].name.clone().unwrap_or(place.clone());
+                let of_variant = variant.and_then(|variant| self.material_in(variant, &primitive));
+                let material = of_variant.or(primitive.material.map(|material| material.value()));
+                mesh.material = material.unwrap_or(default_material);
+                shapes.push(self.shape(&place, &primitive, &mesh, is_skinned[index])?);
                 indices.push(scene.meshes.len());
                 scene.meshes.push(mesh);
             }
             of_mesh.push(indices);
         }
-        Ok(of_mesh)
+        Ok((of_mesh, shapes))
+    }
+
+    /// What can change a primitive's shape.
+    fn shape(&mut self, place: &str, primitive: &Primitive, mesh: &Mesh, is_skinned: bool) -> Result<Shape> {
+        let count = mesh.positions.len();
+        let targets = self.targets(place, primitive, count, !mesh.normals.is_empty())?;
+        let influences = if is_skinned { self.influences(place, primitive, count)? } else { Influences::default() };
+        Ok(Shape { targets, influences })
     }
 
     /// A primitive's triangles; `None`, with a warning, when it has none.
@@ -49,9 +67,6 @@ impl Document<'_> {
             self.warnings.add(format!("left out: {place} has no POSITION"));
             return Ok(None);
         };
-        if primitive.targets.is_some() {
-            self.warnings.add("ignored: morph targets, the base shape is drawn");
-        }
         let positions = self.vectors(place, "POSITION", positions, None)?;
         let count = positions.len();
         let normals = attribute(Semantic::Normals).map(|index| self.vectors(place, "NORMAL", index, Some(count)));
@@ -82,7 +97,7 @@ impl Document<'_> {
     }
 
     /// An attribute of three components (or four, of which the last is dropped), `count` of them if given.
-    fn vectors(&self, place: &str, name: &str, accessor: usize, count: Option<usize>) -> Result<Vec<Vec3>> {
+    pub fn vectors(&self, place: &str, name: &str, accessor: usize, count: Option<usize>) -> Result<Vec<Vec3>> {
         let refuse = |message: String| self.refuse(format!("{place}: {name} (accessors[{accessor}]) {message}"));
         let Elements { components, values } = self.floats(accessor)?;
         if components != 3 && !(components == 4 && name == "COLOR_0") {

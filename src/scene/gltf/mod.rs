@@ -2,18 +2,29 @@
 //!
 //! ```text
 //! bytes ─ container ─→ JSON ─ check ─→ typed JSON (gltf crate) ─ buffers ─→ bytes of accessors
-//!                      nodes ─→ instances, cameras, lights;  primitives ─→ meshes;  materials
+//!                      nodes, primitives, materials, skins, tracks ─→ Asset ─ a time ─→ Scene
 //! ```
+//! A file is opened once, and its [`Asset`] posed at any number of times: nodes moved by an animation, meshes morphed and skinned.
+//!
 //! Nothing is trusted: every index, size and count is checked against what is there before it is used. A fault that
 //! leaves no sensible picture refuses the file; any other, and everything that is not shown, becomes a warning.
 
 mod accessor;
+mod animation;
+mod asset;
 mod buffers;
 mod check;
+mod choice;
 mod container;
 mod materials;
 mod meshes;
+mod morph;
 mod nodes;
+mod pose;
+mod skin;
+
+pub use asset::Asset;
+pub use choice::{AnimationSummary, Contents, ReadOptions};
 
 use super::Scene;
 use crate::error::{Error, Result};
@@ -25,21 +36,45 @@ use std::io::Read;
 use std::path::Path;
 
 /// Extensions that are shown exactly.
-pub const SUPPORTED_EXTENSIONS: [&str; 5] = [
+pub const SUPPORTED_EXTENSIONS: [&str; 7] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
 ];
 
 /// Reads a scene from a `.gltf` or `.glb` file, or from standard input for `-` (then without files beside it).
-/// `scene_choice` is the name or index of one of the file's scenes.
 ///
 /// # Errors
 /// `Read` when a file cannot be read; `Content` when it is not glTF, is broken, or requires an extension that is not
-/// supported; `Usage` when there is no such scene.
-pub fn read(path: &Path, scene_choice: Option<&str>) -> Result<Scene> {
+/// supported; `Usage` when there is no such scene, animation or variant.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Scene> {
+    open(path, options)?.into_scene()
+}
+
+/// Reads a scene from the bytes of a `.gltf` or `.glb` file called `file` in messages. Files that it names are looked for
+/// in `folder`; without one they are refused.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(
+    bytes: &[u8],
+    name: String,
+    file: &str,
+    folder: Option<&Path>,
+    options: &ReadOptions,
+) -> Result<Scene> {
+    open_bytes(bytes, name, file, folder, options)?.into_scene()
+}
+
+/// Opens a file, as [`read`] does, to show it at several times.
+///
+/// # Errors
+/// As [`read`].
+pub fn open(path: &Path, options: &ReadOptions) -> Result<Asset> {
     let is_stdin = path.as_os_str() == "-";
     let failed = |source| Error::Read { path: path.to_owned(), source };
     let bytes = if is_stdin {
@@ -53,32 +88,26 @@ pub fn read(path: &Path, scene_choice: Option<&str>) -> Result<Scene> {
     let name =
         if is_stdin { "stdin".into() } else { path.file_stem().unwrap_or_default().to_string_lossy().into_owned() };
     let file = if is_stdin { "standard input".into() } else { path.display().to_string() };
-    parse(&bytes, name, &file, folder, scene_choice)
+    open_bytes(&bytes, name, &file, folder, options)
 }
 
-/// Reads a scene from the bytes of a `.gltf` or `.glb` file called `file` in messages. Files that it names are looked for
-/// in `folder`; without one they are refused.
+/// Opens the bytes of a file, as [`parse`] reads them.
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(
+pub fn open_bytes(
     bytes: &[u8],
     name: String,
     file: &str,
     folder: Option<&Path>,
-    scene_choice: Option<&str>,
-) -> Result<Scene> {
+    options: &ReadOptions,
+) -> Result<Asset> {
     let container = container::split(bytes).map_err(|message| Error::content(file, message))?;
     let mut document = Document::new(container, file)?;
     document.buffers = buffers::load(&document.root, container.binary, folder, &mut document.warnings);
     document.check_data();
     document.note_what_is_not_shown();
-    let mut scene = Scene { name, ..Scene::default() };
-    document.add_materials(&mut scene);
-    let primitives = document.add_meshes(&mut scene)?;
-    document.add_nodes(&mut scene, &primitives, scene_choice)?;
-    scene.warnings = document.warnings.into_lines();
-    Ok(scene)
+    document.into_asset(name, options)
 }
 
 /// A parsed and checked document.
@@ -87,6 +116,8 @@ struct Document<'a> {
     file: &'a str,
     /// As the `gltf` crate types it.
     root: Root,
+    animations: Vec<animation::Declared>,
+    skins: Vec<skin::Declared>,
     /// Content of each buffer, or why there is none.
     buffers: Vec<Result<Vec<u8>, String>>,
     warnings: Warnings,
@@ -105,8 +136,10 @@ impl<'a> Document<'a> {
         check::version(&value).map_err(refuse)?;
         check::required_extensions(&value).map_err(refuse)?;
         check::document(&value, container.binary.is_some(), &mut warnings).map_err(refuse)?;
+        let animations = animation::declared(&value, &mut warnings);
+        let skins = skin::declared(&value);
         let root = typed(container.json, value).map_err(|error| refuse(format!("not a glTF document: {error}")))?;
-        Ok(Self { file, root, buffers: Vec::new(), warnings, spent: Cell::new(0) })
+        Ok(Self { file, root, animations, skins, buffers: Vec::new(), warnings, spent: Cell::new(0) })
     }
 
     fn refuse(&self, message: impl ToString) -> Error {
@@ -117,8 +150,6 @@ impl<'a> Document<'a> {
     fn note_what_is_not_shown(&mut self) {
         let root = &self.root;
         let notes = [
-            (root.skins.len(), "skins: meshes stand in their bind pose"),
-            (root.animations.len(), "animations: the nodes' own transforms are shown"),
             (root.textures.len(), "textures: factors alone colour the materials"),
         ];
         for (count, what) in notes {
@@ -134,7 +165,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The document in the types of the `gltf` crate; if it is too strict for it, without what is not read anyway.
+/// The document in the types of the `gltf` crate; if it is too strict for it, without what is not read from them anyway.
 fn typed(json: &[u8], mut value: Value) -> serde_json::Result<Root> {
     serde_json::from_slice(json).or_else(|_| {
         for unused in ["animations", "skins", "textures", "images", "samplers"] {
