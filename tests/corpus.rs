@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 fn load(path: &Path) -> Result<Scene> {
-    gltf::read(path, None)
+    gltf::read(path, &gltf::ReadOptions::default())
 }
 
 /// A row of the manifest.

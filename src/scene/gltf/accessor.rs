@@ -84,7 +84,9 @@ impl Document<'_> {
         let kind = &self.root.accessors[index].component_type;
         let fits = matches!(kind, Checked::Valid(kind) if matches!(kind.0, ComponentType::U8 | ComponentType::U16));
         if elements.components != 4 || !fits {
-            return Err(self.refuse(format!("accessors[{index}]: joints must be four unsigned integers of 8 or 16 bits")));
+            return Err(
+                self.refuse(format!("accessors[{index}]: joints must be four unsigned integers of 8 or 16 bits"))
+            );
         }
         Ok(elements.values)
     }

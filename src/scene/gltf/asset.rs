@@ -146,7 +146,9 @@ impl Document<'_> {
             let joints = self.skins[index].joints.len();
             let last = primitives[mesh].iter().filter_map(|own| shapes[*own].influences.last_joint()).max();
             if let Some(beyond) = last.filter(|joint| *joint as usize >= joints) {
-                return Err(self.refuse(format!("meshes[{mesh}]: joint {beyond}, but skins[{index}] has {joints} joints")));
+                return Err(
+                    self.refuse(format!("meshes[{mesh}]: joint {beyond}, but skins[{index}] has {joints} joints"))
+                );
             }
             if node.places.is_some() {
                 self.warnings.add("ignored: EXT_mesh_gpu_instancing of a mesh with a skin");
@@ -207,7 +209,10 @@ impl Asset {
     }
 
     /// The scene at the time that it was opened for. Meshes are moved, not copied.
-    pub(super) fn into_scene(mut self) -> Result<Scene> {
+    ///
+    /// # Errors
+    /// As [`Asset::scene`].
+    pub fn into_scene(mut self) -> Result<Scene> {
         let base = std::mem::take(&mut self.base);
         self.fill(base, self.at)
     }

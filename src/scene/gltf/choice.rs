@@ -61,7 +61,8 @@ impl Document<'_> {
     /// Names of the variants of materials.
     pub fn variants(&self) -> Vec<String> {
         let extensions = self.root.extensions.as_ref();
-        let variants = extensions.and_then(|extensions| extensions.others.get("KHR_materials_variants")?.get("variants"));
+        let variants =
+            extensions.and_then(|extensions| extensions.others.get("KHR_materials_variants")?.get("variants"));
         let name = |variant: &Value| variant.get("name").and_then(Value::as_str).unwrap_or_default().to_owned();
         variants.and_then(Value::as_array).into_iter().flatten().map(name).collect()
     }

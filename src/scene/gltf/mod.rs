@@ -60,13 +60,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Scene> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(
-    bytes: &[u8],
-    name: String,
-    file: &str,
-    folder: Option<&Path>,
-    options: &ReadOptions,
-) -> Result<Scene> {
+pub fn parse(bytes: &[u8], name: String, file: &str, folder: Option<&Path>, options: &ReadOptions) -> Result<Scene> {
     open_bytes(bytes, name, file, folder, options)?.into_scene()
 }
 
@@ -149,9 +143,7 @@ impl<'a> Document<'a> {
     /// Warns of all parts of the file that have no influence on the picture yet.
     fn note_what_is_not_shown(&mut self) {
         let root = &self.root;
-        let notes = [
-            (root.textures.len(), "textures: factors alone colour the materials"),
-        ];
+        let notes = [(root.textures.len(), "textures: factors alone colour the materials")];
         for (count, what) in notes {
             if count > 0 {
                 self.warnings.add(format!("ignored: {count} {what}"));

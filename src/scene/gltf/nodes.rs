@@ -23,7 +23,8 @@ impl Local {
         if let Some(matrix) = node.matrix {
             return Self::Matrix(DMat4::from_cols_array(&matrix.map(f64::from)));
         }
-        let vector = |values: Option<[f32; 3]>, default| values.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
+        let vector =
+            |values: Option<[f32; 3]>, default| values.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
         Self::Parts {
             translation: vector(node.translation, DVec3::ZERO),
             rotation: node.rotation.map_or(DQuat::IDENTITY, |rotation| unit(&rotation.0.map(f64::from))),
@@ -101,8 +102,7 @@ impl Document<'_> {
         for (parent, node) in self.root.nodes.iter().enumerate() {
             node.children.iter().flatten().for_each(|child| nodes[child.value()].parent = Some(parent));
         }
-        let children =
-            |node: usize| self.root.nodes[node].children.iter().flatten().rev().map(|child| child.value());
+        let children = |node: usize| self.root.nodes[node].children.iter().flatten().rev().map(|child| child.value());
         // Children in their own order: the stack turns them round.
         let mut order: Vec<usize> = Vec::with_capacity(nodes.len());
         let mut stack: Vec<usize> = (0..nodes.len()).filter(|node| nodes[*node].parent.is_none()).collect();
@@ -219,7 +219,9 @@ impl Document<'_> {
             values.as_ref().map_or(default, |values| glam::Vec3::from_slice(&values[3 * i..]).as_dvec3())
         };
         let transform = |i: usize| {
-            let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |values| unit(&std::array::from_fn(|k| values[4 * i + k].into())));
+            let rotation = rotations
+                .as_ref()
+                .map_or(DQuat::IDENTITY, |values| unit(&std::array::from_fn(|k| values[4 * i + k].into())));
             DMat4::from_scale_rotation_translation(
                 vector(&scales, i, DVec3::ONE),
                 rotation,

@@ -121,7 +121,9 @@ impl Document<'_> {
         };
         if joint_from_mesh.len() < joints.len() {
             let (matrices, joints) = (joint_from_mesh.len(), joints.len());
-            return Err(self.refuse(format!("skins[{index}] has {joints} joints, but {matrices} inverse bind matrices")));
+            return Err(
+                self.refuse(format!("skins[{index}] has {joints} joints, but {matrices} inverse bind matrices"))
+            );
         }
         let joints = joints.clone();
         let mut roots = joints.iter().map(|joint| hierarchy.root_of(*joint));
@@ -164,7 +166,10 @@ impl Document<'_> {
         const NEARLY: f32 = 0.02;
         let (mut without, mut far) = (0, 0);
         for weights in influences.weights.chunks_exact_mut(influences.per_vertex.max(1)) {
-            weights.iter_mut().filter(|weight| !(**weight > 0.0 && weight.is_finite())).for_each(|weight| *weight = 0.0);
+            weights
+                .iter_mut()
+                .filter(|weight| !(**weight > 0.0 && weight.is_finite()))
+                .for_each(|weight| *weight = 0.0);
             let sum: f32 = weights.iter().sum();
             without += usize::from(sum == 0.0);
             far += usize::from(sum != 0.0 && (sum - 1.0).abs() > NEARLY);
