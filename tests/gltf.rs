@@ -7,14 +7,14 @@ use serde_json::{json, Value};
 
 /// A document under construction: accessors over one buffer.
 #[derive(Default)]
-struct Builder {
+pub struct Builder {
     bytes: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
 }
 
 impl Builder {
-    fn view(&mut self, bytes: &[u8], stride: Option<usize>) -> usize {
+    pub fn view(&mut self, bytes: &[u8], stride: Option<usize>) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let mut view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
         if let Some(stride) = stride {
@@ -25,13 +25,14 @@ impl Builder {
         self.views.len() - 1
     }
 
-    fn accessor(&mut self, accessor: Value) -> usize {
+    pub fn accessor(&mut self, accessor: Value) -> usize {
         self.accessors.push(accessor);
         self.accessors.len() - 1
     }
 
-    fn floats(&mut self, shape: &str, values: &[f32]) -> usize {
-        let components = if shape == "VEC3" { 3 } else { 4 };
+    pub fn floats(&mut self, shape: &str, values: &[f32]) -> usize {
+        let components =
+            [("SCALAR", 1), ("VEC3", 3), ("VEC4", 4), ("MAT4", 16)].iter().find(|own| own.0 == shape).unwrap().1;
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.view(&bytes, None);
         let count = values.len() / components;
@@ -39,7 +40,7 @@ impl Builder {
     }
 
     /// A document with one node for one mesh of one primitive; `more` overrides top-level members.
-    fn document(&self, primitive: Value, more: Value) -> Value {
+    pub fn document(&self, primitive: Value, more: Value) -> Value {
         use base64::Engine;
         let data = base64::engine::general_purpose::STANDARD.encode(&self.bytes);
         let mut document = json!({
@@ -56,7 +57,7 @@ fn read(document: &Value) -> Result<Scene> {
     gltf::parse(document.to_string().as_bytes(), "test".into(), "test.gltf", None, &gltf::ReadOptions::default())
 }
 
-const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+pub const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 fn triangle(more: Value) -> Result<Scene> {
     let mut builder = Builder::default();
@@ -64,7 +65,7 @@ fn triangle(more: Value) -> Result<Scene> {
     read(&builder.document(json!({"attributes": {"POSITION": positions}}), more))
 }
 
-fn message(result: Result<Scene>) -> String {
+pub fn message(result: Result<Scene>) -> String {
     let Err(error) = result else { panic!("must be refused") };
     assert_eq!(error.exit_code(), 2, "{error}");
     error.to_string()
