@@ -53,7 +53,7 @@ pub enum Error {
         message: String,
     },
     /// The user asked to stop.
-    #[error("interrupted: nothing was written")]
+    #[error("interrupted: nothing unfinished was written")]
     Interrupted,
 }
 

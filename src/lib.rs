@@ -11,7 +11,8 @@
 //!
 //! # The data's path
 //! ```text
-//! scene.glb ─scene::gltf→ Scene ─┬─ Soup ─bvh→ Tree (one, or one a shared mesh and one over instances) ─ quantised records ─┐
+//! scene.glb ─scene::gltf→ Asset ─ a time → Scene
+//!                          Scene ─┬─ Soup ─bvh→ Tree (one, or one a shared mesh and one over instances) ─ quantised records ─┐
 //!                                ├─ View (camera, lights, size)                                      render::upload → device buffers
 //!                                └─ Features → specialization constants, passes, buffers (render::Plan)
 //! buffers ─render::frame→ primary → per round { prepare → shade → prepare → shadow; reflection } → resolve → Film → file

@@ -189,3 +189,33 @@ fn the_budget_of_cuts_goes_where_boxes_are_empty() {
     // Shared out by numbers, the long ones would get 900.
     assert!(made > 2500, "{made} parts");
 }
+
+#[test]
+fn a_refitted_tree_holds_triangles_that_moved() {
+    let before = hay(3000);
+    // Waves through everything, then all thrown about.
+    let wave = |point: Vec3| point + Vec3::new(point.y.sin(), (3.0 * point.z).cos(), point.x * point.y) * 0.2;
+    let waved: Vec<[Vec3; 3]> = before.iter().map(|corners| corners.map(wave)).collect();
+    let mut thrown = before.clone();
+    thrown.reverse();
+    for quality in QUALITIES {
+        let built = Bvh::over_triangles(&before, quality);
+        for (name, after) in [("as before", &before), ("waved", &waved), ("thrown about", &thrown)] {
+            let mut bvh = built.clone();
+            bvh.refit(after);
+            bvh.validate(&boxes_of(after), Some(after)).unwrap_or_else(|fault| panic!("{quality:?}, {name}: {fault}"));
+            assert!(bvh.order == built.order && bvh.depth == built.depth);
+            let (cost, refitted) = (built.stats().sah_cost, bvh.stats().sah_cost);
+            println!("{quality:?}, {name}: SAH {cost:.1} built, {refitted:.1} refitted");
+            // Without cuts nothing is lost by refitting to the same triangles.
+            assert!(name != "as before" || quality != Quality::Fast || (refitted - cost).abs() < 1e-9 * cost);
+            assert!(name != "thrown about" || refitted > 1.5 * cost);
+        }
+        assert!(built.validate(&boxes_of(&waved), Some(&waved)).is_err(), "without refitting it must not hold");
+    }
+    for few in [0, 1, 2] {
+        let mut bvh = Bvh::over_triangles(&before[..few], Quality::Best);
+        bvh.refit(&waved[..few]);
+        bvh.validate(&boxes_of(&waved[..few]), Some(&waved[..few])).unwrap();
+    }
+}

@@ -5,6 +5,7 @@
 //! * `bvh` — invariants on random and hostile boxes, determinism
 //! * `scene` — shapes, transforms, cameras, materials
 //! * `gltf` — accessors of every kind, hierarchies, faults, written by the tests themselves
+//! * `poses` — animations, skins, morph targets against values computed by hand; variants, visibility, sequences
 //! * `frames` — pictures: against the reference, closed forms, determinism, features
 //! * `hard_scenes` — pictures that are hard on trees, stacks and f32
 //! * `measuring` — bench, stress and study as programs
@@ -24,6 +25,7 @@ mod gltf;
 mod hard_scenes;
 mod layout;
 mod measuring;
+mod poses;
 mod scene;
 mod stress;
 mod study;

@@ -20,6 +20,11 @@ impl Aabb {
         points.into_iter().fold(Self::EMPTY, |all, point| Self { lo: all.lo.min(point), hi: all.hi.max(point) })
     }
 
+    /// The smallest box around both.
+    pub fn union(&self, other: &Self) -> Self {
+        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    }
+
     /// Half the surface; 0 when empty.
     pub fn half_area(&self) -> f32 {
         let size = (self.hi - self.lo).max(Vec3::ZERO);

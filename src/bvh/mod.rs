@@ -8,6 +8,7 @@ mod build;
 mod object_split;
 mod quantise;
 mod references;
+mod refit;
 mod spatial_split;
 mod stats;
 

@@ -1,6 +1,7 @@
 //! `glimt bench`.
 
 use super::machine::MachineArgs;
+use super::reading::ReadArgs;
 use super::values::BvhChoice;
 use super::{load_scene, milliseconds, Context, Outcome};
 use clap::{Args, ValueEnum, ValueHint};
@@ -36,6 +37,8 @@ pub struct BenchArgs {
     /// Trace the rays of DIR/NAME.SET.rays and count answers that differ from DIR/NAME.SET.ref
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, conflicts_with = "export")]
     compare: Option<PathBuf>,
+    #[command(flatten)]
+    read: ReadArgs,
     /// How much work goes into the tree
     #[arg(long, value_enum, default_value_t = BvhChoice::Best)]
     bvh: BvhChoice,
@@ -88,7 +91,7 @@ impl BenchArgs {
         if let Some(folder) = &self.export {
             std::fs::create_dir_all(folder).map_err(|error| Error::write(folder, error))?;
         }
-        let scene = load_scene(&self.scene, None)?;
+        let scene = load_scene(&self.scene, &self.read.options())?;
         let (prepared, view) = self.prepare(&scene, &options)?;
         let renderer = Renderer::new(&options.device, self.machine.validate)?;
         let build = || {
@@ -137,7 +140,7 @@ impl BenchArgs {
         let text = std::fs::read(path).map_err(|source| Error::Read { path: path.clone(), source })?;
         let refuse = |message: String| Error::content(path.display().to_string(), message);
         let view: BenchView = serde_json::from_slice(&text).map_err(|error| refuse(error.to_string()))?;
-        let tiled = |side: u32| (8..=4096).contains(&side) && side % 8 == 0;
+        let tiled = |side: u32| (8..=4096).contains(&side) && side.is_multiple_of(8);
         if !tiled(view.width) || !tiled(view.height) {
             return Err(refuse("width and height must be multiples of 8 from 8 to 4096".into()));
         }

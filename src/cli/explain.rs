@@ -37,7 +37,7 @@ enum Form {
 impl ExplainArgs {
     /// Plans the scene without any device.
     pub fn run(self) -> Result<Outcome> {
-        let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
+        let scene = load_scene(&self.scene, &self.view.read.options())?;
         let options = self.view.options()?;
         let prepared = Prepared::new(&scene, &options)?;
         let tree = prepared.tree(&options);

@@ -1,7 +1,9 @@
 //! `glimt info`.
 
-use super::{load_scene, Outcome};
+use super::reading::ReadArgs;
+use super::{open_source, Outcome, Source};
 use clap::{Args, ValueHint};
+use glimt::scene::gltf::Contents;
 use glimt::scene::{Instancing, LightKind, Projection, Soup};
 use glimt::{Result, Scene};
 use serde::Serialize;
@@ -13,9 +15,8 @@ pub struct InfoArgs {
     /// A .gltf or .glb file, - for standard input, or a built-in scene
     #[arg(value_hint = ValueHint::FilePath)]
     scene: String,
-    /// Scene of the file, by name or index
-    #[arg(long = "scene", value_name = "NAME|INDEX")]
-    scene_choice: Option<String>,
+    #[command(flatten)]
+    read: ReadArgs,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -36,11 +37,34 @@ struct Info {
     #[serde(skip)]
     without_lights: &'static str,
     cameras: Vec<String>,
+    animations: Vec<Animation>,
+    skins: Vec<Skin>,
+    morph_targets: Vec<Morph>,
+    variants: Vec<String>,
     warnings: Vec<String>,
 }
 
+#[derive(Serialize)]
+struct Animation {
+    name: String,
+    duration_s: f64,
+    channels: usize,
+}
+
+#[derive(Serialize)]
+struct Skin {
+    name: String,
+    joints: usize,
+}
+
+#[derive(Serialize)]
+struct Morph {
+    mesh: String,
+    targets: usize,
+}
+
 impl Info {
-    fn of(scene: &Scene) -> Result<Self> {
+    fn of(scene: &Scene, contents: &Contents) -> Result<Self> {
         let soup = Soup::with(scene, Instancing::Auto)?;
         let rgb = |v: glam::DVec3| format!("{:.3} {:.3} {:.3}", v.x, v.y, v.z);
         let material = |material: &glimt::scene::Material| {
@@ -95,6 +119,18 @@ impl Info {
                 false => "none: a default light is used",
             },
             cameras: scene.cameras.iter().map(camera).collect(),
+            animations: contents
+                .animations
+                .iter()
+                .map(|own| Animation { name: own.name.clone(), duration_s: own.duration, channels: own.channels })
+                .collect(),
+            skins: contents.skins.iter().map(|(name, joints)| Skin { name: name.clone(), joints: *joints }).collect(),
+            morph_targets: contents
+                .morphs
+                .iter()
+                .map(|(mesh, targets)| Morph { mesh: mesh.clone(), targets: *targets })
+                .collect(),
+            variants: contents.variants.clone(),
             warnings: scene.warnings.iter().chain(&soup.warnings).cloned().collect(),
         })
     }
@@ -106,6 +142,26 @@ impl Info {
         );
         if let Some([lo, hi]) = self.bounds {
             let _ = writeln!(text, "box: {lo:.4?} to {hi:.4?}");
+        }
+        // What most files have none of is not spoken of there.
+        let numbered = |lines: Vec<String>| -> Vec<String> {
+            lines.into_iter().enumerate().map(|(index, line)| format!("{index} {line}")).collect()
+        };
+        let animation = |own: &Animation| format!("'{}': {:.3} s, {} channels", own.name, own.duration_s, own.channels);
+        let moving = [
+            ("animations", numbered(self.animations.iter().map(animation).collect())),
+            (
+                "skins",
+                numbered(self.skins.iter().map(|own| format!("'{}': {} joints", own.name, own.joints)).collect()),
+            ),
+            ("morph targets", self.morph_targets.iter().map(|own| format!("{}: {}", own.mesh, own.targets)).collect()),
+            ("variants", numbered(self.variants.iter().map(|own| format!("'{own}'")).collect())),
+        ];
+        for (title, lines) in moving.iter().filter(|(_, lines)| !lines.is_empty()) {
+            let _ = writeln!(text, "{title}:");
+            for line in lines {
+                let _ = writeln!(text, "  {line}");
+            }
         }
         let lists = [
             ("cameras", &self.cameras, "none: one that frames the scene is used"),
@@ -129,7 +185,14 @@ impl Info {
 impl InfoArgs {
     /// Reads the scene and describes it.
     pub fn run(self) -> Result<Outcome> {
-        let info = Info::of(&load_scene(&self.scene, self.scene_choice.as_deref())?)?;
+        let (scene, contents) = match open_source(&self.scene, &self.read.options())? {
+            Source::BuiltIn(scene) => (scene, Contents::default()),
+            Source::File(asset) => {
+                let contents = asset.contents().clone();
+                (asset.into_scene()?, contents)
+            }
+        };
+        let info = Info::of(&scene, &contents)?;
         if self.json {
             Outcome::json(&info)
         } else {

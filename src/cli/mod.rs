@@ -8,13 +8,16 @@ mod explain;
 mod info;
 mod machine;
 mod progress;
+mod reading;
 mod render;
+mod sequence;
 mod stress;
 mod study;
 mod values;
 mod view;
 
 use clap::{Parser, Subcommand};
+use glimt::scene::gltf::{Asset, ReadOptions};
 use glimt::{scene, Error, Options, Result, Scene};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -59,6 +62,7 @@ Examples:
   glimt render model.glb --size 512x512 --spp 16 --background transparent
   glimt render cornell --json | jq .times_ms        one JSON object on standard output
   cat model.glb | glimt render - -o - > out.png     from a pipe to a pipe
+  glimt render model.glb --frames 0..48 --fps 24 -o 'frame_{:04}.png'    a sequence of its animation
   glimt explain model.glb                           what is computed, what is left out, and why
   glimt bench model.glb --sets primary,shadow        how fast rays of a view are traced
   glimt stress --quick                              which extreme cases hold on this device
@@ -126,23 +130,46 @@ impl Cli {
     }
 }
 
-/// A scene by the name of a built-in one, by path, or `-` for standard input. A file wins over a built-in of its name.
-fn load_scene(name: &str, scene_choice: Option<&str>) -> Result<Scene> {
+/// What a scene argument names.
+enum Source {
+    BuiltIn(Scene),
+    File(Box<Asset>),
+}
+
+/// Opens a scene by the name of a built-in one, by path, or `-` for standard input. A file wins over a built-in of its name.
+fn open_source(name: &str, options: &ReadOptions) -> Result<Source> {
     let is_built_in = scene::BUILT_IN.iter().any(|(own, _)| *own == name);
     if is_built_in && (Path::new(name).is_dir() || !Path::new(name).exists()) {
-        if let Some(choice) = scene_choice {
-            return Err(Error::Usage(format!("the built-in scene '{name}' has no scene '{choice}' in it")));
+        let ReadOptions { scene: choice, animation, variant, at, .. } = options;
+        for (kind, choice) in [("scene", choice), ("animation", animation), ("variant", variant)] {
+            if let Some(choice) = choice {
+                return Err(Error::Usage(format!("the built-in scene '{name}' has no {kind} '{choice}' in it")));
+            }
         }
-        return scene::built_in(name);
+        if at.is_some() {
+            return Err(Error::Usage(format!(
+                "the built-in scene '{name}' has no animation: it is the same at all times"
+            )));
+        }
+        return scene::built_in(name).map(Source::BuiltIn);
     }
-    scene::gltf::read(Path::new(name), scene_choice).map_err(|error| match error {
+    let asset = scene::gltf::open(Path::new(name), options).map_err(|error| match error {
         Error::Read { path, source } if source.kind() == std::io::ErrorKind::NotFound => Error::Usage(format!(
             "{}: no such file, and no built-in scene of that name ({})",
             path.display(),
             scene::BUILT_IN.map(|(own, _)| own).join(", ")
         )),
         error => error,
-    })
+    })?;
+    Ok(Source::File(Box::new(asset)))
+}
+
+/// The scene that a scene argument names.
+fn load_scene(name: &str, options: &ReadOptions) -> Result<Scene> {
+    match open_source(name, options)? {
+        Source::BuiltIn(scene) => Ok(scene),
+        Source::File(asset) => asset.into_scene(),
+    }
 }
 
 fn stop_if_interrupted(options: &Options) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use super::machine::MachineArgs;
 use super::view::ViewArgs;
-use super::{load_scene, milliseconds, progress, stop_if_interrupted, Context, Outcome};
+use super::{load_scene, milliseconds, progress, sequence, stop_if_interrupted, Context, Outcome};
 use clap::{Args, ValueHint};
 use glimt::film::{Film, Format, Saved};
 use glimt::render::{describe, Prepared, Renderer};
@@ -17,13 +17,21 @@ use std::time::{Duration, Instant};
 pub struct RenderArgs {
     /// A .gltf or .glb file, - for standard input, or a built-in scene: table, cornell, mirrors, teapot
     #[arg(value_hint = ValueHint::FilePath, default_value = "table")]
-    scene: String,
-    /// File to write: .png, .exr or .hdr; - writes PNG to standard output [default: the scene's name with .png]
+    pub(super) scene: String,
+    /// File to write: .png, .exr or .hdr; - writes PNG to standard output; with --frames {} or {:04} in its name is the frame's
+    /// number [default: the scene's name with .png]
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    output: Option<PathBuf>,
+    pub(super) output: Option<PathBuf>,
+    /// Render a sequence: frames A, A + 1, … up to but without B, each at its number / --fps seconds; a camera that frames the
+    /// scene by itself stays where the first frame has it
+    #[arg(long, value_name = "A..B", value_parser = sequence::frames, conflicts_with_all = ["at", "max_time"])]
+    frames: Option<std::ops::Range<u32>>,
+    /// Frames a second
+    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = sequence::fps, requires = "frames")]
+    pub(super) fps: f64,
     /// Bits a channel of a PNG
     #[arg(long, value_name = "8|16", default_value_t = 8, value_parser = bits)]
-    bits: u8,
+    pub(super) bits: u8,
     /// Add samples until the estimated RMSE in linear RGB is this small, instead of --spp
     #[arg(long, value_name = "RMSE")]
     target_error: Option<f64>,
@@ -31,15 +39,15 @@ pub struct RenderArgs {
     #[arg(long, value_name = "SECONDS")]
     max_time: Option<f64>,
     #[command(flatten)]
-    machine: MachineArgs,
+    pub(super) machine: MachineArgs,
     /// Print one JSON object on standard output, nothing else
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
     /// Say nothing but errors
     #[arg(short, long)]
-    quiet: bool,
+    pub(super) quiet: bool,
     #[command(flatten)]
-    view: ViewArgs,
+    pub(super) view: ViewArgs,
 }
 
 fn bits(text: &str) -> Result<u8, String> {
@@ -59,6 +67,9 @@ impl RenderArgs {
         options.progress = if self.quiet { None } else { progress::bar() };
         options.target_error = self.target_error;
         options.deadline = self.max_time.map(|seconds| deadline(context.started, seconds)).transpose()?;
+        if let Some(frames) = &self.frames {
+            return self.run_sequence(frames.clone(), options, context);
+        }
         let target = Target::of(&self)?;
         if target.format == Format::Hdr && options.background == Background::Transparent {
             return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
@@ -115,7 +126,7 @@ impl RenderArgs {
 
     fn on_reference(&self, options: &Options) -> Result<(Film, Report)> {
         let start = Instant::now();
-        let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
+        let scene = load_scene(&self.scene, &self.view.read.options())?;
         // Not prepared for any device: every triangle as it is.
         let soup = Soup::of(&scene)?;
         let view = options.view(&scene, &soup)?;
@@ -134,7 +145,7 @@ impl RenderArgs {
     }
 
     fn load(&self, options: &Options) -> Result<(Scene, Prepared)> {
-        let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
+        let scene = load_scene(&self.scene, &self.view.read.options())?;
         stop_if_interrupted(options)?;
         let prepared = Prepared::new(&scene, options)?;
         Ok((scene, prepared))
@@ -148,7 +159,7 @@ fn deadline(start: Instant, seconds: f64) -> Result<Instant> {
 }
 
 /// What the file says of a picture that was made until an error or a time was reached.
-fn notes(report: &Report) -> Vec<(&'static str, String)> {
+pub(super) fn notes(report: &Report) -> Vec<(&'static str, String)> {
     let Some(reached) = report.convergence else { return Vec::new() };
     vec![
         ("Software", format!("glimt {}", env!("CARGO_PKG_VERSION"))),
@@ -161,9 +172,9 @@ fn notes(report: &Report) -> Vec<(&'static str, String)> {
 }
 
 /// Where the picture goes.
-struct Target {
-    path: PathBuf,
-    format: Format,
+pub(super) struct Target {
+    pub path: PathBuf,
+    pub format: Format,
     is_stdout: bool,
 }
 
@@ -184,12 +195,17 @@ impl Target {
             file.push(".png");
             PathBuf::from(file)
         });
-        let format = Format::of(&path, args.bits)?;
-        glimt::film::check_writable(&path)?;
-        Ok(Self { path, format, is_stdout })
+        Self::in_file(path, args.bits)
     }
 
-    fn save(
+    /// A file that can be written.
+    pub fn in_file(path: PathBuf, bits: u8) -> Result<Self> {
+        let format = Format::of(&path, bits)?;
+        glimt::film::check_writable(&path)?;
+        Ok(Self { path, format, is_stdout: false })
+    }
+
+    pub fn save(
         &self,
         film: &Film,
         notes: &[(&str, String)],

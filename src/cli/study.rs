@@ -116,7 +116,7 @@ impl StudyArgs {
             std::fs::create_dir_all(folder).map_err(|error| Error::write(folder, error))?;
             film::check_writable(&folder.join("study.html"))?;
         }
-        let scene = load_scene(&self.scene, self.view.scene_choice.as_deref())?;
+        let scene = load_scene(&self.scene, &self.view.read.options())?;
         let device = self.machine.device.clone().map_or(DeviceChoice::Best, DeviceChoice::Named);
         let renderer = Renderer::new(&device, options.validate)?;
         let plan = Plan { knobs: self.knobs.clone(), reference, repeats: self.repeats, target_rmse: self.target_rmse };

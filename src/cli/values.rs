@@ -111,6 +111,18 @@ pub fn vector(text: &str) -> Result<DVec3, String> {
     }
 }
 
+/// A number of bytes: `500M` is 500 · 2²⁰.
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let (digits, unit) = match text.strip_suffix(['K', 'M', 'G']) {
+        Some(digits) if text.ends_with('K') => (digits, 10),
+        Some(digits) if text.ends_with('M') => (digits, 20),
+        Some(digits) => (digits, 30),
+        None => (text, 0),
+    };
+    let count = digits.parse::<u64>().ok().and_then(|count| count.checked_mul(1 << unit));
+    count.filter(|count| *count > 0).ok_or_else(|| format!("'{text}' is no size such as 500M"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,5 +1,6 @@
 //! Flags that choose the picture, the same for every command that renders.
 
+use super::reading::ReadArgs;
 use super::values::{size, vector, BvhChoice, FilterChoice, InstancingChoice, SamplerChoice};
 use clap::Args;
 use glam::DVec3;
@@ -30,9 +31,8 @@ pub struct ViewArgs {
     /// gradient, transparent, black, white, #rrggbb (sRGB) or r,g,b (linear)
     #[arg(long, value_name = "COLOR", default_value = "gradient")]
     background: Background,
-    /// Scene of the file, by name or index [default: the file's own default]
-    #[arg(long = "scene", value_name = "NAME|INDEX")]
-    pub scene_choice: Option<String>,
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// Camera of the file, by name or index [default: its first; one that frames the scene if it has none]
     #[arg(long, value_name = "NAME|INDEX", conflicts_with_all = ["eye", "orbit", "target"])]
     camera: Option<String>,

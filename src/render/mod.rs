@@ -89,14 +89,30 @@ impl Prepared {
 
     /// Builds its tree.
     pub fn tree(&self, options: &Options) -> Tree {
-        let Self { soup, view, .. } = self;
-        let sabotage = |one| options.sabotage == Some(one);
-        let rebase = if sabotage(Sabotage::NoRebase) { Rebase::NONE } else { Rebase::for_view(soup.lo, soup.hi, view) };
-        // Light that passes a triangle must meet it once: none may lie in two leaves.
-        let quality = if self.features.layers { Quality::Fast } else { options.quality(soup.len()) };
-        let mut tree = Tree::build(soup, rebase, quality);
-        tree.rounds_outward = !sabotage(Sabotage::TightBoxes);
+        let mut tree = Tree::build(&self.soup, self.rebase(options), self.quality(options));
+        tree.rounds_outward = options.sabotage != Some(Sabotage::TightBoxes);
         tree
+    }
+
+    /// Its tree, made of the one of the frame before if that pays: see [`Tree::next`]. The picture is the same.
+    pub fn next_tree(&self, options: &Options, last: &Tree) -> Tree {
+        last.next(&self.soup, self.rebase(options), self.quality(options))
+    }
+
+    /// Light that passes a triangle must meet it once: none may lie in two leaves.
+    fn quality(&self, options: &Options) -> Quality {
+        if self.features.layers {
+            Quality::Fast
+        } else {
+            options.quality(self.soup.len())
+        }
+    }
+
+    fn rebase(&self, options: &Options) -> Rebase {
+        match options.sabotage {
+            Some(Sabotage::NoRebase) => Rebase::NONE,
+            _ => Rebase::for_view(self.soup.lo, self.soup.hi, &self.view),
+        }
     }
 }
 
@@ -232,6 +248,7 @@ impl Renderer {
             return Err(Error::Validation(messages));
         }
         let report = Report {
+            frame: None,
             image: report::Image { width: view.width, height: view.height, ..Default::default() },
             device: describe_device(&self.device),
             scene: describe(scene, soup, view),

@@ -22,7 +22,13 @@ pub struct Tree {
     pub quality: Quality,
     /// Boxes are rounded outward when they become coarser, as they must.
     pub rounds_outward: bool,
+    /// How it came from the tree of the frame before, in a sequence.
+    pub update: Option<report::TreeUpdate>,
 }
+
+/// A tree is refitted for the next frame of a sequence as long as that makes it cost at most so many times what it did when it was built.
+/// By the heuristic a ray then takes 1.3 times as long; a sequence's frame traces many rays, so that a new tree soon pays.
+const MOST_LOOSE: f64 = 1.3;
 
 /// Rounds of loops that no driver cuts short: Mesa 22.3 ends them after 65 535.
 const MOST_ROUNDS: u64 = 60_000;
@@ -34,6 +40,37 @@ struct Part {
     bvh: Bvh,
     /// From the part's space to the device's for it.
     rebase: Rebase,
+    /// Its cost when it was built, where it was refitted since.
+    built_cost: Option<f64>,
+}
+
+impl Part {
+    /// Its cost when it was built.
+    fn built_cost(&self) -> f64 {
+        self.built_cost.unwrap_or_else(|| self.bvh.stats().sah_cost)
+    }
+}
+
+/// The triangles of a part as the device sees them, and the space that they are in.
+fn part_space(soup: &Soup, range: &std::ops::Range<usize>, world: Rebase) -> (Vec<[Vec3; 3]>, Rebase) {
+    let positions = &soup.positions[range.clone()];
+    let own = || {
+        let (lo, hi) = bounds_of(positions);
+        Rebase::new(lo, hi, (lo + hi) / 2.0)
+    };
+    let rebase = if soup.is_flat() { world } else { own() };
+    let local = |corners: &[DVec3; 3]| corners.map(|corner| rebase.point(corner));
+    (positions.par_iter().map(local).collect(), rebase)
+}
+
+/// The tree over the placements of parts; `None` for a flat soup.
+fn upper_tree(soup: &Soup, parts: &[Part], world: Rebase) -> Option<Bvh> {
+    let world_box = |placement: &Placement| {
+        let part = &parts[placement.part];
+        world_box(&part.bvh.bounds, &Transforms::new(placement, part.rebase, world))
+    };
+    let boxes = || soup.placements.par_iter().map(world_box).collect::<Vec<Aabb>>();
+    (!soup.is_flat()).then(|| Bvh::over_boxes(&boxes(), 1))
 }
 
 /// A space on the device: one of the scene's, moved and scaled in f64 so that f32 is spent on what is seen, not on where the
@@ -144,29 +181,60 @@ impl Tree {
     /// Builds the trees over a soup in a world of the device's.
     pub fn build(soup: &Soup, rebase: Rebase, quality: Quality) -> Self {
         let part = |range: &std::ops::Range<usize>| {
-            let positions = &soup.positions[range.clone()];
-            let own = || {
-                let (lo, hi) = bounds_of(positions);
-                Rebase::new(lo, hi, (lo + hi) / 2.0)
-            };
-            let rebase = if soup.is_flat() { rebase } else { own() };
-            let local = |corners: &[DVec3; 3]| corners.map(|corner| rebase.point(corner));
-            let triangles: Vec<[Vec3; 3]> = positions.par_iter().map(local).collect();
-            Part { bvh: Bvh::over_triangles(&triangles, quality), rebase }
+            let (triangles, rebase) = part_space(soup, range, rebase);
+            Part { bvh: Bvh::over_triangles(&triangles, quality), rebase, built_cost: None }
         };
         let parts: Vec<Part> = soup.parts.par_iter().map(part).collect();
-        let upper = (!soup.is_flat()).then(|| {
-            let boxes: Vec<Aabb> = soup
-                .placements
-                .par_iter()
-                .map(|placement| {
-                    let part = &parts[placement.part];
-                    world_box(&part.bvh.bounds, &Transforms::new(placement, part.rebase, rebase))
-                })
-                .collect();
-            Bvh::over_boxes(&boxes, 1)
-        });
-        Self { parts, upper, rebase, quality, rounds_outward: true }
+        let upper = upper_tree(soup, &parts, rebase);
+        Self { parts, upper, rebase, quality, rounds_outward: true, update: None }
+    }
+
+    /// The trees for the next frame of a sequence: these with new boxes if the soup has as many triangles in each part and no
+    /// part's cost exceeds [`MOST_LOOSE`] times its cost when it was built; otherwise new ones.
+    pub fn next(&self, soup: &Soup, rebase: Rebase, quality: Quality) -> Self {
+        let refitted = self.has_parts_of(soup).then(|| self.refitted(soup, rebase));
+        // Of the part that has become loosest.
+        let looseness = |part: &&Part| part.bvh.stats().sah_cost / part.built_cost();
+        let loosest = |tree: &Self| {
+            let by_looseness = |a: &&Part, b: &&Part| looseness(a).total_cmp(&looseness(b));
+            tree.parts.iter().max_by(by_looseness).map(|part| (part.built_cost(), part.bvh.stats().sah_cost))
+        };
+        let costs = refitted.as_ref().and_then(loosest);
+        let update = |action| report::TreeUpdate {
+            action,
+            built_cost: costs.map(|(built, _)| built),
+            refitted_cost: costs.map(|(_, refitted)| refitted),
+        };
+        match (refitted, costs) {
+            (Some(tree), Some((built, now))) if quality == self.quality && now <= MOST_LOOSE * built => {
+                Self { update: Some(update("refitted")), ..tree }
+            }
+            _ => {
+                let tree = Self::build(soup, rebase, quality);
+                Self { update: Some(update("rebuilt")), rounds_outward: self.rounds_outward, ..tree }
+            }
+        }
+    }
+
+    /// The soup has as many triangles in each part as the one that these trees are over.
+    fn has_parts_of(&self, soup: &Soup) -> bool {
+        let primitives = |part: &Part| part.bvh.order.iter().max().map_or(0, |last| *last as usize + 1);
+        self.parts.len() == soup.parts.len()
+            && self.parts.iter().zip(&soup.parts).all(|(part, range)| primitives(part) == range.len())
+    }
+
+    /// The same trees with the boxes of a soup whose triangles have moved.
+    fn refitted(&self, soup: &Soup, rebase: Rebase) -> Self {
+        let part = |(part, range): (&Part, &std::ops::Range<usize>)| {
+            let (triangles, rebase) = part_space(soup, range, rebase);
+            let mut bvh = part.bvh.clone();
+            bvh.refit(&triangles);
+            Part { bvh, rebase, built_cost: Some(part.built_cost()) }
+        };
+        let parts: Vec<Part> = self.parts.par_iter().zip(&soup.parts).map(part).collect();
+        let upper = upper_tree(soup, &parts, rebase);
+        let Self { quality, rounds_outward, .. } = *self;
+        Self { parts, upper, rebase, quality, rounds_outward, update: None }
     }
 
     /// The features with what the trees themselves need.
@@ -234,6 +302,7 @@ impl Tree {
             depth: self.depth(),
             sah_cost: root.map_or(0.0, |stats| stats.sah_cost),
             bytes: 32 * nodes as u64,
+            update: self.update,
         }
     }
 

@@ -17,6 +17,9 @@ use std::collections::BTreeMap;
 /// All that `--json` prints.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
+    /// Which of a sequence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame: Option<Frame>,
     /// The picture written.
     pub image: Image,
     /// Where it was computed.
@@ -38,6 +41,15 @@ pub struct Report {
     pub times_ms: Times,
     /// Bytes on the device.
     pub memory_bytes: Memory,
+}
+
+/// A picture of a sequence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Frame {
+    /// Its number.
+    pub number: u32,
+    /// Its time.
+    pub seconds: f64,
 }
 
 /// The picture written.
@@ -132,6 +144,21 @@ pub struct Tree {
     pub sah_cost: f64,
     /// Bytes of nodes on the device.
     pub bytes: u64,
+    /// How it came from the tree of the frame before, in a sequence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub update: Option<TreeUpdate>,
+}
+
+/// What became of the tree of the frame before. Costs are those of the part of the tree that has become loosest, in triangle tests
+/// a ray that meets it; null where the triangles are not the same.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TreeUpdate {
+    /// `refitted` or `rebuilt`.
+    pub action: &'static str,
+    /// When it was last built.
+    pub built_cost: Option<f64>,
+    /// Refitted to this frame.
+    pub refitted_cost: Option<f64>,
 }
 
 /// Wall-clock milliseconds. Device start-up runs beside loading, so the parts may add up to more than the total.
@@ -149,7 +176,7 @@ pub struct Times {
     pub render: f64,
     /// Encoding and writing.
     pub save: f64,
-    /// Everything, from the start of the process.
+    /// Everything, from the start of the process, or the end of the frame before.
     pub total: f64,
 }
 

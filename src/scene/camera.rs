@@ -45,6 +45,8 @@ pub enum CameraChoice {
     Auto,
     /// The file's, by index or name.
     Named(String),
+    /// This one.
+    Fixed(Camera),
     /// From `eye` to `target`.
     LookAt {
         /// Position.
@@ -117,6 +119,17 @@ fn orbit(theta: f64, phi: f64, radius: f64, target: DVec3, up: DVec3, projection
     Camera::looking(target + radius * outward, -outward, up, projection)
 }
 
+impl CameraChoice {
+    /// The camera depends on where the scene's triangles are, so that it would follow them through a sequence.
+    pub fn frames(&self, scene: &Scene) -> bool {
+        match self {
+            Self::Auto => scene.cameras.is_empty(),
+            Self::LookAt { target, .. } | Self::Orbit { target, .. } => target.is_none(),
+            Self::Named(_) | Self::Fixed(_) => false,
+        }
+    }
+}
+
 impl Scene {
     /// The camera that `choice` means, for a picture of this scene and its `soup`, of `aspect` = width / height. `up` is used where the choice has no
     /// up of its own; `fov` (radians, vertical) replaces any perspective camera's.
@@ -140,6 +153,7 @@ impl Scene {
                 None => Camera::framing(bounds, up, aspect, fov.unwrap_or(DEFAULT_FOV))?,
             },
             CameraChoice::Named(name) => self.named_camera(name)?,
+            CameraChoice::Fixed(camera) => *camera,
             CameraChoice::LookAt { eye, target } => {
                 Camera::looking(*eye, target.unwrap_or_else(center) - *eye, up, perspective)?
             }

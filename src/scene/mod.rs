@@ -32,7 +32,6 @@ pub use self::image::{Image, Pixels};
 pub use background::Background;
 pub use builtin::{built_in, BUILT_IN};
 pub use camera::{Camera, CameraChoice, Projection};
-pub use image::{Image, Pixels};
 pub use light::{Light, LightKind};
 pub use lobes::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Lobes, Sheen, Volume};
 pub use material::{AlphaMode, Material, Whitted};

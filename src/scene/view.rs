@@ -100,7 +100,7 @@ impl View {
     /// Columns and rows of sample cells in a pixel: the most square factors of the number of samples.
     pub fn strata(&self) -> (u32, u32) {
         let root = f64::from(self.samples).sqrt() as u32;
-        let columns = (1..=root.max(1)).rev().find(|columns| self.samples % columns == 0).unwrap_or(1);
+        let columns = (1..=root.max(1)).rev().find(|columns| self.samples.is_multiple_of(*columns)).unwrap_or(1);
         (columns, self.samples / columns)
     }
 }

@@ -194,7 +194,7 @@ pub(super) fn bad_input(stress: &mut Stress) -> Result<()> {
             "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}}],
             "buffers":[{{"byteLength":42,"uri":"{uri}"}}]}}"#
         );
-        let read = gltf::parse(document.as_bytes(), "past".into(), "past.gltf", None, None);
+        let read = gltf::parse(document.as_bytes(), "past".into(), "past.gltf", None, &gltf::ReadOptions::default());
         let names_it = |message: &str| message.contains("index 9") || message.contains("9");
         Ok(Finding::check(match read {
             Err(Error::Content { message, .. }) => names_it(&message),

@@ -219,7 +219,7 @@ mod tests {
     fn fetched_buffers_are_never_a_power_of_two() {
         for bytes in 0..70_000 {
             let size = padded(bytes, true);
-            assert!(size >= bytes && size % 16 == 0 && !(size / 16).is_power_of_two(), "{bytes}: {size}");
+            assert!(size >= bytes && size.is_multiple_of(16) && !(size / 16).is_power_of_two(), "{bytes}: {size}");
         }
     }
 }

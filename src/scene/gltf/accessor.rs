@@ -4,11 +4,13 @@ use super::Document;
 use crate::error::Result;
 use ::gltf::json::accessor::{ComponentType, Type};
 use ::gltf::json::{buffer, validation::Checked, Index};
+use glam::{DMat4, Mat4};
 
 /// Most elements of an accessor that no buffer view backs: there the count alone decides what is allocated.
 const MOST_UNBACKED: u64 = 1 << 20;
-/// Most numbers that all meshes of a document are made of: 2 GiB. Many primitives may name the same bytes.
-const MOST_NUMBERS: u64 = 1 << 29;
+/// Most numbers that all meshes and textures of a document are made of, unless something else is asked for: 2 GiB. Many primitives may name the same
+/// bytes.
+pub(super) const MOST_NUMBERS: u64 = 1 << 29;
 /// Most numbers that are checked against their bounds and for being finite.
 const MOST_CHECKED: u64 = 1 << 28;
 
@@ -77,6 +79,31 @@ impl Document<'_> {
         Ok(elements.values)
     }
 
+    /// Elements of an accessor of four-component unsigned integers: the joints of each vertex.
+    pub fn joints(&self, index: usize) -> Result<Vec<u32>> {
+        self.spend(index)?;
+        let elements = self.read(index, 0, integer)?;
+        let kind = &self.root.accessors[index].component_type;
+        let fits = matches!(kind, Checked::Valid(kind) if matches!(kind.0, ComponentType::U8 | ComponentType::U16));
+        if elements.components != 4 || !fits {
+            return Err(
+                self.refuse(format!("accessors[{index}]: joints must be four unsigned integers of 8 or 16 bits"))
+            );
+        }
+        Ok(elements.values)
+    }
+
+    /// Elements of an accessor of 4 × 4 float matrices, column-major.
+    pub fn matrices(&self, index: usize) -> Result<Vec<DMat4>> {
+        let kind = &self.root.accessors[index].component_type;
+        let is_float = matches!(kind, Checked::Valid(kind) if kind.0 == ComponentType::F32);
+        let Elements { components, values } = self.floats(index)?;
+        if components != 16 || !is_float {
+            return Err(self.refuse(format!("accessors[{index}]: matrices must be MAT4 of floats")));
+        }
+        Ok(values.chunks_exact(16).map(|columns| Mat4::from_cols_slice(columns).as_dmat4()).collect())
+    }
+
     /// Takes an accessor's numbers from what the document may still allocate.
     fn spend(&self, index: usize) -> Result<()> {
         self.spend_numbers(self.numbers(index))
@@ -84,14 +111,15 @@ impl Document<'_> {
 
     /// Numbers that the document may still allocate.
     pub fn numbers_left(&self) -> u64 {
-        MOST_NUMBERS.saturating_sub(self.spent.get())
+        self.most_numbers.saturating_sub(self.spent.get())
     }
 
     pub fn spend_numbers(&self, numbers: u64) -> Result<()> {
         let spent = self.spent.get().saturating_add(numbers);
         self.spent.set(spent);
-        if spent > MOST_NUMBERS {
-            return Err(self.refuse("its meshes have more data than 2 GiB"));
+        if spent > self.most_numbers {
+            let bytes = 4 * self.most_numbers;
+            return Err(self.refuse(format!("its meshes and textures take more than {bytes} bytes (see --max-memory)")));
         }
         Ok(())
     }
@@ -151,8 +179,9 @@ impl Document<'_> {
             return Err(refuse("its type or component type is unknown"));
         };
         let (kind, components) = (kind.0, shape.multiplicity());
-        if matches!(shape, Type::Mat2 | Type::Mat3 | Type::Mat4) {
-            return Err(refuse("matrices are not read here"));
+        // Their columns may be padded to 4 bytes; those of MAT4 never are.
+        if matches!(shape, Type::Mat2 | Type::Mat3) {
+            return Err(refuse("matrices of 2 or 3 columns are not read"));
         }
         let element = kind.size() * components;
         let values = match accessor.buffer_view {

@@ -1,37 +1,57 @@
 //! glTF primitives → [`Mesh`]: attributes and triangles.
 
 use super::accessor::Elements;
+use super::pose::Shape;
+use super::skin::Influences;
 use super::{draco, Document};
 use crate::error::Result;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Maps, Mesh, Scene};
 use ::gltf::json::mesh::{Mode, Primitive};
 use ::gltf::json::validation::Checked;
 use glam::{Vec2, Vec3, Vec4};
 
 impl Document<'_> {
-    /// Adds every primitive that can be drawn; answers, for each glTF mesh, the indices of what it became.
-    pub fn add_meshes(&mut self, scene: &mut Scene) -> Result<Vec<Vec<usize>>> {
+    /// Adds every primitive that can be drawn, with the materials of a variant; answers, for each glTF mesh, the indices of
+    /// what it became, and for each of these what can change its shape.
+    pub fn add_meshes(&mut self, scene: &mut Scene, variant: Option<usize>) -> Result<(Vec<Vec<usize>>, Vec<Shape>)> {
         let default_material = scene.materials.len() - 1;
-        let mut of_mesh = Vec::new();
+        let (mut of_mesh, mut shapes) = (Vec::new(), Vec::new());
+        let mut is_skinned = vec![false; self.root.meshes.len()];
+        for mesh in self.root.nodes.iter().filter_map(|node| node.skin.and(node.mesh)) {
+            is_skinned[mesh.value()] = true;
+        }
         for index in 0..self.root.meshes.len() {
             let mut indices = Vec::new();
             let count = self.root.meshes[index].primitives.len();
             for part in 0..count {
                 let place = format!("meshes[{index}].primitives[{part}]");
                 let primitive = self.root.meshes[index].primitives[part].clone();
-                let Some(mut mesh) = self.primitive(&place, &primitive)? else { continue };
-                mesh.name = self.root.meshes[index].name.clone().unwrap_or(place);
-                mesh.material = primitive.material.map_or(default_material, |material| material.value());
+                let of_variant = variant.and_then(|variant| self.material_in(variant, &primitive));
+                let material = of_variant.or(primitive.material.map(|material| material.value()));
+                let material = material.unwrap_or(default_material);
+                let maps = scene.materials[material].drawn_maps();
+                let Some(mut mesh) = self.primitive(&place, &primitive, &maps)? else { continue };
+                mesh.name = self.root.meshes[index].name.clone().unwrap_or(place.clone());
+                mesh.material = material;
+                shapes.push(self.shape(&place, &primitive, &mesh, is_skinned[index])?);
                 indices.push(scene.meshes.len());
                 scene.meshes.push(mesh);
             }
             of_mesh.push(indices);
         }
-        Ok(of_mesh)
+        Ok((of_mesh, shapes))
     }
 
-    /// A primitive's triangles; `None`, with a warning, when it has none.
-    fn primitive(&mut self, place: &str, primitive: &Primitive) -> Result<Option<Mesh>> {
+    /// What can change a primitive's shape.
+    fn shape(&mut self, place: &str, primitive: &Primitive, mesh: &Mesh, is_skinned: bool) -> Result<Shape> {
+        let targets = self.targets(place, primitive, mesh)?;
+        let influences =
+            if is_skinned { self.influences(place, primitive, mesh.positions.len())? } else { Influences::default() };
+        Ok(Shape { targets, influences })
+    }
+
+    /// A primitive's triangles, with what these maps of its material need; `None`, with a warning, when it has none.
+    fn primitive(&mut self, place: &str, primitive: &Primitive, maps: &Maps) -> Result<Option<Mesh>> {
         let mode = match primitive.mode {
             Checked::Valid(mode) => mode,
             Checked::Invalid => return Err(self.refuse(format!("{place}: its mode is unknown"))),
@@ -46,15 +66,19 @@ impl Document<'_> {
             self.warnings.add(format!("left out: {place} has no POSITION"));
             return Ok(None);
         };
-        if primitive.targets.is_some() {
-            self.warnings.add("ignored: morph targets, the base shape is drawn");
-        }
         let count = positions.len();
         let normals = self.vectors(place, primitive, "NORMAL", Some(count))?.unwrap_or_default();
         let colors = self.colors(place, primitive, count)?;
-        let (first, second) =
-            (self.texcoords(place, primitive, 0, count)?, self.texcoords(place, primitive, 1, count)?);
-        let tangents = self.tangents(place, primitive, count)?;
+        let texcoords = |set: usize| match maps.list().iter().any(|(map, _)| map.is_some_and(|map| map.texcoord == set))
+        {
+            true => self.texcoords(place, primitive, set, count),
+            false => Ok(None),
+        };
+        let texcoords = both_sets(texcoords(0)?, texcoords(1)?);
+        if maps.any() && texcoords.is_empty() {
+            self.warnings.add(format!("{place}: its material has textures, but it has no texture coordinates"));
+        }
+        let given = maps.normal.is_some().then(|| self.tangents(place, primitive, count)).transpose()?.flatten();
         let corners = self.corners(primitive)?.unwrap_or_else(|| (0..count as u32).collect());
         if let Some(beyond) = corners.iter().find(|corner| **corner as usize >= count) {
             return Err(self.refuse(format!("{place}: index {beyond} lies beyond its {count} vertices")));
@@ -67,17 +91,15 @@ impl Document<'_> {
         if !colors.iter().all(in_range) {
             self.warnings.add(format!("{place}: COLOR_0 has values outside 0 to 1; they were clamped"));
         }
-        Ok(Some(Mesh {
-            positions,
-            normals,
-            colors: colors.into_iter().map(|color| finite(color).clamp(Vec4::ZERO, Vec4::ONE)).collect(),
-            texcoords: both_sets(first, second),
-            tangents: tangents.map_or(Vec::new(), |tangents| {
-                triangles.iter().map(|corners| corners.map(|corner| tangents[corner as usize])).collect()
-            }),
-            triangles,
-            ..Mesh::default()
-        }))
+        let tangents = given.map_or(Vec::new(), |tangents| {
+            triangles.iter().map(|corners| corners.map(|corner| tangents[corner as usize])).collect()
+        });
+        let colors = colors.into_iter().map(|color| finite(color).clamp(Vec4::ZERO, Vec4::ONE)).collect();
+        let mut mesh = Mesh { positions, normals, colors, texcoords, tangents, triangles, ..Mesh::default() };
+        if let Some(map) = maps.normal.filter(|_| mesh.tangents.is_empty()) {
+            mesh.tangents = mesh.tangents_for(&map).unwrap_or_default();
+        }
+        Ok(Some(mesh))
     }
 
     /// Elements of an attribute if there is one, `count` of them, of as many components as allowed.
@@ -107,7 +129,7 @@ impl Document<'_> {
         Ok(elements.values.chunks_exact(elements.components).map(color).collect())
     }
 
-    fn texcoords(&self, place: &str, primitive: &Primitive, set: u32, count: usize) -> Result<Option<Vec<Vec2>>> {
+    fn texcoords(&self, place: &str, primitive: &Primitive, set: usize, count: usize) -> Result<Option<Vec<Vec2>>> {
         let elements = self.checked(place, primitive, &format!("TEXCOORD_{set}"), &[2], count)?;
         Ok(elements.map(|elements| elements.values.chunks_exact(2).map(Vec2::from_slice).collect()))
     }
@@ -125,8 +147,20 @@ impl Document<'_> {
         name: &str,
         count: Option<usize>,
     ) -> Result<Option<Vec<Vec3>>> {
+        let elements = self.attribute(primitive, name)?;
+        elements.map(|elements| self.vectors_of(place, name, elements, count)).transpose()
+    }
+
+    /// Elements of three components.
+    pub fn vectors_of(
+        &self,
+        place: &str,
+        name: &str,
+        elements: Elements<f32>,
+        count: Option<usize>,
+    ) -> Result<Vec<Vec3>> {
         let refuse = |message: String| self.refuse(format!("{place}: {name} {message}"));
-        let Some(Elements { components, values }) = self.attribute(primitive, name)? else { return Ok(None) };
+        let Elements { components, values } = elements;
         if components != 3 {
             return Err(refuse(format!("has {components} components")));
         }
@@ -135,7 +169,7 @@ impl Document<'_> {
             Some(count) if vectors.len() != count => {
                 Err(refuse(format!("has {} elements, POSITION has {count}", vectors.len())))
             }
-            _ => Ok(Some(vectors)),
+            _ => Ok(vectors),
         }
     }
 }

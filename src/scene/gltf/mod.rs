@@ -1,25 +1,34 @@
 //! glTF 2.0 → [`Scene`].
 //!
 //! ```text
-//! bytes ─ container ─→ JSON ─ check ─→ typed JSON (gltf crate) ─ buffers, meshopt ─→ bytes of accessors
-//!                      nodes ─→ instances, cameras, lights;  primitives, draco ─→ meshes;  images;  materials
+//! bytes ─ container ─→ JSON ─ check ─→ typed JSON (gltf crate) ─ buffers, meshopt, draco ─→ bytes of accessors
+//!                      nodes, primitives, materials, images, skins, tracks ─→ Asset ─ a time ─→ Scene
 //! ```
+//! A file is opened once, and its [`Asset`] posed at any number of times: nodes moved by an animation, meshes morphed and skinned.
+//!
 //! Nothing is trusted: every index, size and count is checked against what is there before it is used. A fault that
 //! leaves no sensible picture refuses the file; any other, and everything that is not shown, becomes a warning.
 
 mod accessor;
+mod animation;
+mod asset;
 mod buffers;
 mod check;
+mod choice;
 mod container;
 mod draco;
-// Until materials have textures.
-#[allow(dead_code)]
 mod images;
 mod materials;
 mod meshes;
 mod meshopt;
+mod morph;
 mod nodes;
+mod pose;
+mod skin;
 mod textures;
+
+pub use asset::Asset;
+pub use choice::{AnimationSummary, Contents, ReadOptions};
 
 use super::Scene;
 use crate::error::{Error, Result};
@@ -32,24 +41,42 @@ use std::path::Path;
 use std::rc::Rc;
 
 /// Extensions that are shown exactly.
-pub const SUPPORTED_EXTENSIONS: [&str; 8] = [
+pub const SUPPORTED_EXTENSIONS: [&str; 10] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
+    "KHR_node_visibility",
 ];
 
 /// Reads a scene from a `.gltf` or `.glb` file, or from standard input for `-` (then without files beside it).
-/// `scene_choice` is the name or index of one of the file's scenes.
 ///
 /// # Errors
 /// `Read` when a file cannot be read; `Content` when it is not glTF, is broken, or requires an extension that is not
-/// supported; `Usage` when there is no such scene.
-pub fn read(path: &Path, scene_choice: Option<&str>) -> Result<Scene> {
+/// supported; `Usage` when there is no such scene, animation or variant.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Scene> {
+    open(path, options)?.into_scene()
+}
+
+/// Reads a scene from the bytes of a `.gltf` or `.glb` file called `file` in messages. Files that it names are looked for
+/// in `folder`; without one they are refused.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(bytes: &[u8], name: String, file: &str, folder: Option<&Path>, options: &ReadOptions) -> Result<Scene> {
+    open_bytes(bytes, name, file, folder, options)?.into_scene()
+}
+
+/// Opens a file, as [`read`] does, to show it at several times.
+///
+/// # Errors
+/// As [`read`].
+pub fn open(path: &Path, options: &ReadOptions) -> Result<Asset> {
     let is_stdin = path.as_os_str() == "-";
     let failed = |source| Error::Read { path: path.to_owned(), source };
     let bytes = if is_stdin {
@@ -63,33 +90,27 @@ pub fn read(path: &Path, scene_choice: Option<&str>) -> Result<Scene> {
     let name =
         if is_stdin { "stdin".into() } else { path.file_stem().unwrap_or_default().to_string_lossy().into_owned() };
     let file = if is_stdin { "standard input".into() } else { path.display().to_string() };
-    parse(&bytes, name, &file, folder, scene_choice)
+    open_bytes(&bytes, name, &file, folder, options)
 }
 
-/// Reads a scene from the bytes of a `.gltf` or `.glb` file called `file` in messages. Files that it names are looked for
-/// in `folder`; without one they are refused.
+/// Opens the bytes of a file, as [`parse`] reads them.
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(
+pub fn open_bytes(
     bytes: &[u8],
     name: String,
     file: &str,
     folder: Option<&Path>,
-    scene_choice: Option<&str>,
-) -> Result<Scene> {
+    options: &ReadOptions,
+) -> Result<Asset> {
     let container = container::split(bytes).map_err(|message| Error::content(file, message))?;
     let mut document = Document::new(container, file)?;
+    document.most_numbers = options.max_memory.map_or(accessor::MOST_NUMBERS, |bytes| bytes / 4);
     document.load(container.binary, folder);
     document.check_data();
     document.note_what_is_not_shown();
-    let mut scene = Scene { name, ..Scene::default() };
-    document.add_textures(&mut scene);
-    document.add_materials(&mut scene);
-    let primitives = document.add_meshes(&mut scene)?;
-    document.add_nodes(&mut scene, &primitives, scene_choice)?;
-    scene.warnings = document.warnings.into_lines();
-    Ok(scene)
+    document.into_asset(name, options)
 }
 
 /// A parsed and checked document.
@@ -98,6 +119,8 @@ struct Document<'a> {
     file: &'a str,
     /// As the `gltf` crate types it.
     root: Root,
+    animations: Vec<animation::Declared>,
+    skins: Vec<skin::Declared>,
     /// Content of each buffer, or why there is none.
     buffers: Vec<Result<Vec<u8>, String>>,
     /// Content of the buffer views that are compressed.
@@ -109,6 +132,8 @@ struct Document<'a> {
     warnings: Warnings,
     /// Numbers that accessors have been expanded to.
     spent: Cell<u64>,
+    /// How many these may be.
+    most_numbers: u64,
     /// Materials, textures and the like as they are in the file.
     raw: Value,
 }
@@ -128,16 +153,21 @@ impl<'a> Document<'a> {
         for name in ["materials", "textures", "samplers", "images"] {
             raw.insert(name.into(), value.get(name).cloned().unwrap_or_default());
         }
+        let animations = animation::declared(&value, &mut warnings);
+        let skins = skin::declared(&value);
         let root = typed(container.json, value).map_err(|error| refuse(format!("not a glTF document: {error}")))?;
         Ok(Self {
             file,
             root,
+            animations,
+            skins,
             buffers: Vec::new(),
             decompressed: BTreeMap::new(),
             mesh: RefCell::new(None),
             folder: None,
             warnings,
             spent: Cell::new(0),
+            most_numbers: accessor::MOST_NUMBERS,
             raw: Value::Object(raw),
         })
     }
@@ -166,15 +196,6 @@ impl<'a> Document<'a> {
     /// Warns of all parts of the file that have no influence on the picture yet.
     fn note_what_is_not_shown(&mut self) {
         let root = &self.root;
-        let notes = [
-            (root.skins.len(), "skins: meshes stand in their bind pose"),
-            (root.animations.len(), "animations: the nodes' own transforms are shown"),
-        ];
-        for (count, what) in notes {
-            if count > 0 {
-                self.warnings.add(format!("ignored: {count} {what}"));
-            }
-        }
         for extension in &root.extensions_used {
             if !SUPPORTED_EXTENSIONS.contains(&extension.as_str()) {
                 self.warnings.add(format!("ignored: extension {extension}"));
@@ -183,7 +204,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The document in the types of the `gltf` crate; if it is too strict for it, without what is not read anyway.
+/// The document in the types of the `gltf` crate; if it is too strict for it, without what is not read from them anyway.
 fn typed(json: &[u8], mut value: Value) -> serde_json::Result<Root> {
     serde_json::from_slice(json).or_else(|_| {
         for unused in ["animations", "skins", "textures", "images", "samplers"] {

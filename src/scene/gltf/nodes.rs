@@ -1,75 +1,176 @@
-//! The node tree → instances, cameras and lights in world space.
+//! The node tree: transforms, what hangs on the nodes, and which of them the chosen scene has.
 
 use super::Document;
-use crate::error::{Error, Result};
-use crate::scene::{Camera, Instance, Light, LightKind, Projection, Scene};
+use crate::error::Result;
+use crate::scene::{Light, LightKind, Projection};
 use ::gltf::json::extensions::scene::khr_lights_punctual::{self as punctual, Type as LightType};
-use ::gltf::json::scene::Node;
 use ::gltf::json::validation::Checked;
+use ::gltf::json::{self};
 use glam::{DMat4, DQuat, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Most instances of meshes in a scene.
-const MOST_INSTANCES: usize = 1 << 22;
+/// A node's own transform.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Local {
+    /// Given as a matrix, which no animation moves.
+    Matrix(DMat4),
+    /// Given in parts: first scaled, then turned, then moved.
+    Parts { translation: DVec3, rotation: DQuat, scale: DVec3 },
+}
 
-impl Document<'_> {
-    /// Walks the chosen scene's nodes. Transforms are composed in f64.
-    pub fn add_nodes(&mut self, scene: &mut Scene, primitives: &[Vec<usize>], choice: Option<&str>) -> Result<()> {
-        scene.has_lights = !self.lights().is_empty();
-        let mut stack: Vec<(usize, DMat4)> =
-            self.roots(choice)?.into_iter().rev().map(|node| (node, DMat4::IDENTITY)).collect();
-        let mut visited = vec![false; self.root.nodes.len()];
-        while let Some((index, world_from_parent)) = stack.pop() {
-            if std::mem::replace(&mut visited[index], true) {
-                return Err(self.refuse(format!("nodes[{index}] has two parents, or is its own ancestor")));
-            }
-            let node = self.root.nodes[index].clone();
-            let world_from_node = world_from_parent * local_transform(&node);
-            if let Some(mesh) = node.mesh {
-                let places = self.instance_transforms(index, &node)?.unwrap_or_else(|| vec![DMat4::IDENTITY]);
-                let meshes = &primitives[mesh.value()];
-                if scene.instances.len() + places.len().saturating_mul(meshes.len()) > MOST_INSTANCES {
-                    return Err(self.refuse(format!("more than {MOST_INSTANCES} instances of meshes")));
-                }
-                for object_from_instance in places {
-                    let world_from_object = world_from_node * object_from_instance;
-                    let instance = |mesh: &usize| Instance { mesh: *mesh, world_from_object };
-                    scene.instances.extend(meshes.iter().map(instance));
-                }
-            }
-            if let Some(camera) = node.camera {
-                match self.camera(camera.value(), &world_from_node) {
-                    Ok(camera) => scene.cameras.push((node.name.clone().unwrap_or_default(), camera)),
-                    Err(fault) => self.warnings.add(format!("cameras[{}] is not used: {fault}", camera.value())),
-                }
-            }
-            let light = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
-            if let Some(light) = light.and_then(|reference| self.lights().get(reference.light.value())) {
-                match read_light(light) {
-                    Ok(light) => scene.lights.push(light.placed(&world_from_node)),
-                    Err(fault) => self.warnings.add(format!("a light is not used: {fault}")),
-                }
-            }
-            // Children in their own order: the stack turns them round.
-            stack.extend(node.children.iter().flatten().rev().map(|child| (child.value(), world_from_node)));
+impl Local {
+    fn of(node: &json::Node) -> Self {
+        if let Some(matrix) = node.matrix {
+            return Self::Matrix(DMat4::from_cols_array(&matrix.map(f64::from)));
         }
-        Ok(())
+        let vector =
+            |values: Option<[f32; 3]>, default| values.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
+        Self::Parts {
+            translation: vector(node.translation, DVec3::ZERO),
+            rotation: node.rotation.map_or(DQuat::IDENTITY, |rotation| unit(&rotation.0.map(f64::from))),
+            scale: vector(node.scale, DVec3::ONE),
+        }
     }
 
-    fn lights(&self) -> &[punctual::Light] {
-        self.root.as_ref()
+    /// As a matrix.
+    pub fn matrix(&self) -> DMat4 {
+        match *self {
+            Self::Matrix(matrix) => matrix,
+            Self::Parts { translation, rotation, scale } => {
+                DMat4::from_scale_rotation_translation(scale, rotation, translation)
+            }
+        }
+    }
+}
+
+/// A node and what hangs on it.
+#[derive(Debug)]
+pub(super) struct Node {
+    pub name: String,
+    pub parent: Option<usize>,
+    pub local: Local,
+    /// Index of a glTF mesh.
+    pub mesh: Option<usize>,
+    pub skin: Option<usize>,
+    /// Weights of the mesh's morph targets: its own, or else the mesh's.
+    pub weights: Vec<f64>,
+    pub camera: Option<usize>,
+    pub light: Option<usize>,
+    /// Where its mesh stands, in its own space (EXT_mesh_gpu_instancing); `None` for once, at its origin.
+    pub places: Option<Vec<DMat4>>,
+    /// It and what is below it is not drawn (KHR_node_visibility).
+    hidden: bool,
+}
+
+/// A node of the chosen scene.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Member {
+    pub node: usize,
+    /// Neither it nor what is above it is hidden.
+    pub visible: bool,
+}
+
+/// All nodes of the file, and those of the chosen scene.
+#[derive(Debug)]
+pub(super) struct Hierarchy {
+    pub nodes: Vec<Node>,
+    /// All nodes, each behind its parent.
+    pub order: Vec<usize>,
+    /// The chosen scene's nodes, depth first.
+    pub members: Vec<Member>,
+}
+
+impl Hierarchy {
+    /// The nodes of the chosen scene that are visible.
+    pub fn visible(&self) -> impl Iterator<Item = &Node> {
+        self.members.iter().filter(|member| member.visible).map(|member| &self.nodes[member.node])
+    }
+
+    /// The topmost node above a node, or the node itself.
+    pub fn root_of(&self, mut node: usize) -> usize {
+        while let Some(parent) = self.nodes[node].parent {
+            node = parent;
+        }
+        node
+    }
+}
+
+impl Document<'_> {
+    /// Reads all nodes and walks those of the chosen scene.
+    pub fn hierarchy(&mut self, choice: Option<&str>) -> Result<Hierarchy> {
+        let mut nodes: Vec<Node> = self.root.nodes.iter().map(|node| self.node(node)).collect();
+        for (parent, node) in self.root.nodes.iter().enumerate() {
+            node.children.iter().flatten().for_each(|child| nodes[child.value()].parent = Some(parent));
+        }
+        let children = |node: usize| self.root.nodes[node].children.iter().flatten().rev().map(|child| child.value());
+        // Children in their own order: the stack turns them round.
+        let mut order: Vec<usize> = Vec::with_capacity(nodes.len());
+        let mut stack: Vec<usize> = (0..nodes.len()).filter(|node| nodes[*node].parent.is_none()).collect();
+        while let Some(node) = stack.pop() {
+            order.push(node);
+            stack.extend(children(node));
+        }
+        let roots = self.roots(choice)?;
+        let mut members = Vec::new();
+        let mut stack: Vec<(usize, bool)> = roots.into_iter().rev().map(|node| (node, true)).collect();
+        let mut visited = vec![false; nodes.len()];
+        while let Some((node, above)) = stack.pop() {
+            if std::mem::replace(&mut visited[node], true) {
+                return Err(self.refuse(format!("nodes[{node}] has two parents, or is its own ancestor")));
+            }
+            let visible = above && !nodes[node].hidden;
+            members.push(Member { node, visible });
+            let children = self.root.nodes[node].children.iter().flatten().rev();
+            stack.extend(children.map(|child| (child.value(), visible)));
+        }
+        for Member { node, .. } in members.iter().filter(|member| member.visible) {
+            if nodes[*node].mesh.is_some() {
+                nodes[*node].places = self.instance_transforms(*node, &self.root.nodes[*node])?;
+            }
+        }
+        Ok(Hierarchy { nodes, order, members })
+    }
+
+    fn node(&self, node: &json::Node) -> Node {
+        let extensions = node.extensions.as_ref();
+        let visibility = extensions.and_then(|extensions| extensions.others.get("KHR_node_visibility"));
+        let mesh = node.mesh.map(|mesh| mesh.value());
+        let of_mesh = || mesh.and_then(|mesh| self.root.meshes[mesh].weights.clone());
+        let weights = node.weights.clone().or_else(of_mesh).unwrap_or_default();
+        Node {
+            name: node.name.clone().unwrap_or_default(),
+            parent: None,
+            local: Local::of(node),
+            mesh,
+            skin: node.skin.map(|skin| skin.value()).filter(|_| mesh.is_some()),
+            weights: weights.into_iter().map(f64::from).collect(),
+            camera: node.camera.map(|camera| camera.value()),
+            light: extensions
+                .and_then(|extensions| extensions.khr_lights_punctual.as_ref())
+                .map(|reference| reference.light.value()),
+            places: None,
+            hidden: visibility.and_then(|visibility| visibility.get("visible")?.as_bool()) == Some(false),
+        }
+    }
+
+    /// Lights of the file, at the origin, or why they are not used.
+    pub fn read_lights(&self) -> Vec<Result<Light, String>> {
+        let lights: &[punctual::Light] = self.root.as_ref();
+        lights.iter().map(read_light).collect()
+    }
+
+    /// What the cameras of the file project, or why they are not used.
+    pub fn projections(&self) -> Vec<Result<Projection, String>> {
+        self.root.cameras.iter().map(projection).collect()
     }
 
     /// Root nodes of the scene that is wanted, or of the file's default, or of all the file.
     fn roots(&mut self, choice: Option<&str>) -> Result<Vec<usize>> {
         let scenes = &self.root.scenes;
         let index = match choice {
-            Some(name) => {
-                let by_index = name.parse::<usize>().ok().filter(|index| *index < scenes.len());
-                let found = by_index.or_else(|| scenes.iter().position(|scene| scene.name.as_deref() == Some(name)));
-                Some(found.ok_or_else(|| {
-                    Error::Usage(format!("{}: no scene '{name}', it has {}", self.file, scenes.len()))
-                })?)
+            Some(choice) => {
+                let names = scenes.iter().map(|scene| scene.name.as_deref().unwrap_or_default());
+                Some(self.choose("scene", names, choice)?)
             }
             None => self.root.scene.map(|scene| scene.value()).or(if scenes.is_empty() { None } else { Some(0) }),
         };
@@ -91,7 +192,7 @@ impl Document<'_> {
     }
 
     /// EXT_mesh_gpu_instancing: one transform an instance; `None` when the node has no such extension.
-    fn instance_transforms(&mut self, index: usize, node: &Node) -> Result<Option<Vec<DMat4>>> {
+    fn instance_transforms(&self, index: usize, node: &json::Node) -> Result<Option<Vec<DMat4>>> {
         let others = node.extensions.as_ref().map(|extensions| &extensions.others);
         let Some(attributes) = others.and_then(|others| others.get("EXT_mesh_gpu_instancing")?.get("attributes"))
         else {
@@ -118,7 +219,9 @@ impl Document<'_> {
             values.as_ref().map_or(default, |values| glam::Vec3::from_slice(&values[3 * i..]).as_dvec3())
         };
         let transform = |i: usize| {
-            let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |values| unit(&values[4 * i..]));
+            let rotation = rotations
+                .as_ref()
+                .map_or(DQuat::IDENTITY, |values| unit(&std::array::from_fn(|k| values[4 * i + k].into())));
             DMat4::from_scale_rotation_translation(
                 vector(&scales, i, DVec3::ONE),
                 rotation,
@@ -127,44 +230,29 @@ impl Document<'_> {
         };
         Ok(Some((0..count.unwrap_or(0)).map(transform).collect()))
     }
+}
 
-    fn camera(&self, index: usize, world_from_node: &DMat4) -> Result<Camera> {
-        let camera = &self.root.cameras[index];
-        let usage = |message: &str| Error::Usage(message.into());
-        let projection = match (&camera.perspective, &camera.orthographic) {
-            (Some(perspective), None) if perspective.yfov > 0.0 && f64::from(perspective.yfov) < PI => {
-                Projection::Perspective { fov: perspective.yfov.into() }
-            }
-            (None, Some(orthographic)) if orthographic.ymag.abs() > 0.0 => {
-                Projection::Orthographic { half_height: f64::from(orthographic.ymag.abs()) }
-            }
-            (Some(_), Some(_)) | (None, None) => return Err(usage("it must be either perspective or orthographic")),
-            _ => return Err(usage("its field of view or magnification is out of range")),
-        };
-        Camera::of_node(world_from_node, projection)
+fn projection(camera: &json::Camera) -> Result<Projection, String> {
+    match (&camera.perspective, &camera.orthographic) {
+        (Some(perspective), None) if perspective.yfov > 0.0 && f64::from(perspective.yfov) < PI => {
+            Ok(Projection::Perspective { fov: perspective.yfov.into() })
+        }
+        (None, Some(orthographic)) if orthographic.ymag.abs() > 0.0 => {
+            Ok(Projection::Orthographic { half_height: f64::from(orthographic.ymag.abs()) })
+        }
+        (Some(_), Some(_)) | (None, None) => Err("it must be either perspective or orthographic".into()),
+        _ => Err("its field of view or magnification is out of range".into()),
     }
 }
 
-fn unit(xyzw: &[f32]) -> DQuat {
-    let q = DQuat::from_xyzw(xyzw[0].into(), xyzw[1].into(), xyzw[2].into(), xyzw[3].into());
+/// The rotation of a quaternion of any length; none where it has no direction.
+pub(super) fn unit(xyzw: &[f64; 4]) -> DQuat {
+    let q = DQuat::from_array(*xyzw);
     if q.length() > 0.0 && q.is_finite() {
         q.normalize()
     } else {
         DQuat::IDENTITY
     }
-}
-
-fn local_transform(node: &Node) -> DMat4 {
-    if let Some(matrix) = node.matrix {
-        return DMat4::from_cols_array(&matrix.map(f64::from));
-    }
-    let vector = |values: Option<[f32; 3]>, default| values.map_or(default, |v| DVec3::from_array(v.map(f64::from)));
-    let rotation = node.rotation.map_or(DQuat::IDENTITY, |rotation| unit(&rotation.0));
-    DMat4::from_scale_rotation_translation(
-        vector(node.scale, DVec3::ONE),
-        rotation,
-        vector(node.translation, DVec3::ZERO),
-    )
 }
 
 /// A light of the extension, at the origin.

@@ -235,6 +235,9 @@ fn morph_targets<'a>(
     for (index, target) in list(primitive, "targets").iter().enumerate() {
         for (name, value) in target.as_object().into_iter().flatten() {
             let count = |value: &Value| accessor(value).and_then(|accessor| number(accessor, "count"));
+            if !["POSITION", "NORMAL", "TANGENT"].contains(&name.as_str()) {
+                warnings.add(format!("ignored: morph targets of {name}"));
+            }
             match attributes.get(name) {
                 None => warnings.add(format!("{path}.targets[{index}].{name}: there is no such attribute to morph")),
                 Some(base) if count(base) != count(value) => {

@@ -18,6 +18,10 @@ const RAMPS: [&str; 2] = [
      00005a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a052aaaaaaaaa000000000000000000000000000000000000000000000000005201",
 ];
 const TRIANGLES: &str = "e1f01000ffff120101007687566778a9866589689801690000";
+/// Ten triangles in which every kind of code occurs, and their corners.
+const EVERY_CODE: &str = "e1fe204e1e0f05fffbfe0dff120d003f0014f304007687566778a9866589689801690000";
+const CORNERS: [u16; 30] =
+    [0, 9, 2, 9, 0, 1, 9, 0, 3, 3, 0, 4, 3, 4, 4, 3, 4, 9, 4, 3, 14, 2, 0, 9, 3, 16, 4, 3, 4, 15];
 const INDICES: &str = "d100040400020802040414020200000000";
 
 fn ramps() -> Vec<u8> {
@@ -49,6 +53,7 @@ fn triangles_and_indices_of_both_sizes() {
     let wide = indices::decode_triangles(&triangles, 12, 4).unwrap();
     assert_eq!(wide.len(), 48);
     assert_eq!(words(&wide).into_iter().step_by(2).collect::<Vec<u16>>(), expected);
+    assert_eq!(words(&indices::decode_triangles(&bytes_of(EVERY_CODE), 30, 2).unwrap()), CORNERS);
     let indices = bytes_of(INDICES);
     assert_eq!(words(&indices::decode_indices(&indices, 12, 2).unwrap()), expected);
 }
@@ -66,6 +71,7 @@ fn hurt_data_are_answered() {
     }
     (0..triangles.len()).for_each(|end| assert!(indices::decode_triangles(&triangles[..end], 12, 2).is_err(), "{end}"));
     hurt(&triangles, 500, |bytes| drop(indices::decode_triangles(bytes, 12, 2)));
+    hurt(&bytes_of(EVERY_CODE), 500, |bytes| drop(indices::decode_triangles(bytes, 30, 4)));
     (0..indices.len()).for_each(|end| assert!(indices::decode_indices(&indices[..end], 12, 2).is_err(), "{end}"));
     hurt(&indices, 500, |bytes| drop(indices::decode_indices(bytes, 12, 2)));
     // Counts that the bytes are not for.
