@@ -12,9 +12,10 @@
 //! # The data's path
 //! ```text
 //! scene.glb ─scene::gltf→ Asset ─ a time → Scene
-//!                          Scene ─┬─ Soup ─bvh→ Tree (one, or one a shared mesh and one over instances) ─ quantised records ─┐
-//!                                ├─ View (camera, lights, size)                                      render::upload → device buffers
-//!                                └─ Features → specialization constants, passes, buffers (render::Plan)
+//! Scene ─┬─ Soup ─bvh→ Tree (one, or one a shared mesh and one over instances) ─ quantised records ─┐
+//!        ├─ View (camera, lights, size)                                      render::upload → device buffers
+//!        └─ Features → specialization constants, passes, buffers (render::Plan)
+//! a sequence: Asset ─ times → Scenes, each Tree refitted from the one before or built anew
 //! buffers ─render::frame→ primary → per round { prepare → shade → prepare → shadow; reflection } → resolve → Film → file
 //! buffers ─render::trace→ ray sets through the same kernels → report::Bench
 //! scenes by code ─stress→ render, reference → rows that hold or do not      knobs ─study→ render → error against run time

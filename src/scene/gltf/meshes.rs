@@ -9,6 +9,7 @@ use crate::scene::{Maps, Mesh, Scene};
 use ::gltf::json::mesh::{Mode, Primitive};
 use ::gltf::json::validation::Checked;
 use glam::{Vec2, Vec3, Vec4};
+use std::collections::BTreeSet;
 
 impl Document<'_> {
     /// Adds every primitive that can be drawn, with the materials of a variant; answers, for each glTF mesh, the indices of
@@ -16,10 +17,8 @@ impl Document<'_> {
     pub fn add_meshes(&mut self, scene: &mut Scene, variant: Option<usize>) -> Result<(Vec<Vec<usize>>, Vec<Shape>)> {
         let default_material = scene.materials.len() - 1;
         let (mut of_mesh, mut shapes) = (Vec::new(), Vec::new());
-        let mut is_skinned = vec![false; self.root.meshes.len()];
-        for mesh in self.root.nodes.iter().filter_map(|node| node.skin.and(node.mesh)) {
-            is_skinned[mesh.value()] = true;
-        }
+        let skinned: BTreeSet<usize> =
+            self.root.nodes.iter().filter_map(|node| node.skin.and(node.mesh)).map(|mesh| mesh.value()).collect();
         for index in 0..self.root.meshes.len() {
             let mut indices = Vec::new();
             let count = self.root.meshes[index].primitives.len();
@@ -33,7 +32,7 @@ impl Document<'_> {
                 let Some(mut mesh) = self.primitive(&place, &primitive, &maps)? else { continue };
                 mesh.name = self.root.meshes[index].name.clone().unwrap_or(place.clone());
                 mesh.material = material;
-                shapes.push(self.shape(&place, &primitive, &mesh, is_skinned[index])?);
+                shapes.push(self.shape(&place, &primitive, &mesh, skinned.contains(&index))?);
                 indices.push(scene.meshes.len());
                 scene.meshes.push(mesh);
             }
