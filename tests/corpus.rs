@@ -40,7 +40,7 @@ fn manifest(corpus: &Path) -> Vec<Model> {
 }
 
 fn is_supported(model: &Model) -> bool {
-    model.required.split(',').all(|name| name == "-" || gltf::SUPPORTED_EXTENSIONS.contains(&name))
+    model.required.split(',').all(|name| name == "-" || gltf::standing(name) != Standing::Ignored)
 }
 
 /// Every model that requires nothing we lack renders, with all its triangles, and shows more than one colour; the others

@@ -4,7 +4,7 @@ use super::reading::ReadArgs;
 use super::{open_source, Outcome, Source};
 use clap::{Args, ValueHint};
 use glimt::scene::gltf::Contents;
-use glimt::scene::{Instancing, LightKind, Projection, Soup};
+use glimt::scene::{Image, Instancing, Pixels, Standing, LightKind, Projection, Soup};
 use glimt::{Result, Scene};
 use serde::Serialize;
 use std::fmt::Write;
@@ -41,7 +41,62 @@ struct Info {
     skins: Vec<Skin>,
     morph_targets: Vec<Morph>,
     variants: Vec<String>,
+    extensions: Vec<Extension>,
+    textures: Vec<Picture>,
     warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Extension {
+    name: String,
+    required: bool,
+    standing: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    how: Option<&'static str>,
+}
+
+/// A picture that textures show; its size and format where something visible uses it.
+#[derive(Serialize)]
+struct Picture {
+    name: String,
+    is_used: bool,
+    format: String,
+    width: u32,
+    height: u32,
+    bits: u32,
+    /// In the file.
+    bytes: usize,
+    /// In memory, without its mipmap.
+    decoded_bytes: usize,
+}
+
+impl Picture {
+    fn of(index: usize, image: Option<&Image>) -> Self {
+        let Some(image) = image else {
+            let name = format!("images[{index}]");
+            let format = String::new();
+            return Self { name, is_used: false, format, width: 0, height: 0, bits: 0, bytes: 0, decoded_bytes: 0 };
+        };
+        let bits = if matches!(image.pixels, Pixels::Rgba16(_)) { 16 } else { 8 };
+        Self {
+            name: if image.name.is_empty() { format!("images[{index}]") } else { image.name.clone() },
+            is_used: true,
+            format: image.format.clone(),
+            width: image.width,
+            height: image.height,
+            bits,
+            bytes: image.bytes,
+            decoded_bytes: image.width as usize * image.height as usize * bits as usize / 2,
+        }
+    }
+
+    fn line(&self) -> String {
+        if !self.is_used {
+            return format!("{}: nothing visible shows it", self.name);
+        }
+        let Self { name, format, width, height, bits, bytes, decoded_bytes, .. } = self;
+        format!("{name}: {format}, {width} × {height}, {bits} bit, {bytes} bytes, {decoded_bytes} decoded")
+    }
 }
 
 #[derive(Serialize)]
@@ -131,6 +186,25 @@ impl Info {
                 .map(|(mesh, targets)| Morph { mesh: mesh.clone(), targets: *targets })
                 .collect(),
             variants: contents.variants.clone(),
+            extensions: scene
+                .extensions
+                .iter()
+                .map(|own| Extension {
+                    name: own.name.clone(),
+                    required: own.required,
+                    standing: own.standing.name(),
+                    how: match own.standing {
+                        Standing::Approximated(how) => Some(how),
+                        Standing::Exact | Standing::Ignored => None,
+                    },
+                })
+                .collect(),
+            textures: scene
+                .images
+                .iter()
+                .enumerate()
+                .map(|(index, image)| Picture::of(index, image.as_deref()))
+                .collect(),
             warnings: scene.warnings.iter().chain(&soup.warnings).cloned().collect(),
         })
     }
@@ -148,6 +222,11 @@ impl Info {
             lines.into_iter().enumerate().map(|(index, line)| format!("{index} {line}")).collect()
         };
         let animation = |own: &Animation| format!("'{}': {:.3} s, {} channels", own.name, own.duration_s, own.channels);
+        let extension = |own: &Extension| {
+            let required = if own.required { ", required" } else { "" };
+            let how = own.how.map(|how| format!(": {how}")).unwrap_or_default();
+            format!("{}{required}: {}{how}", own.name, own.standing)
+        };
         let moving = [
             ("animations", numbered(self.animations.iter().map(animation).collect())),
             (
@@ -155,6 +234,8 @@ impl Info {
                 numbered(self.skins.iter().map(|own| format!("'{}': {} joints", own.name, own.joints)).collect()),
             ),
             ("morph targets", self.morph_targets.iter().map(|own| format!("{}: {}", own.mesh, own.targets)).collect()),
+            ("extensions", self.extensions.iter().map(extension).collect()),
+            ("textures", self.textures.iter().map(Picture::line).collect()),
             ("variants", numbered(self.variants.iter().map(|own| format!("'{own}'")).collect())),
         ];
         for (title, lines) in moving.iter().filter(|(_, lines)| !lines.is_empty()) {
@@ -167,7 +248,7 @@ impl Info {
             ("cameras", &self.cameras, "none: one that frames the scene is used"),
             ("lights", &self.lights, self.without_lights),
             ("materials", &self.materials, "none"),
-            ("approximated, ignored or dropped", &self.warnings, "nothing: all of the file is used"),
+            ("faults, and what is approximated or ignored", &self.warnings, "none: all of the file is shown as it says"),
         ];
         for (title, lines, none) in lists {
             let _ = writeln!(text, "{title}:");

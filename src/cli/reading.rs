@@ -24,7 +24,7 @@ pub struct ReadArgs {
     /// Memory that reading the file may take: bytes, or with K, M or G [default: 2G]
     #[arg(long, value_name = "SIZE", value_parser = super::values::bytes)]
     max_memory: Option<u64>,
-    /// Refuse a file with anything that is ignored or not exact
+    /// Refuse a file with anything that is ignored
     #[arg(long)]
     strict: bool,
 }

@@ -8,6 +8,7 @@
 //! ```
 //! Lengths are metres, angles radians, colours linear RGB with the sRGB primaries. World space is right-handed, y up.
 
+mod account;
 mod background;
 mod builtin;
 mod camera;
@@ -29,6 +30,7 @@ mod texture;
 mod view;
 
 pub use self::image::{Image, Pixels};
+pub use account::{ExtensionUse, Standing};
 pub use background::Background;
 pub use builtin::{built_in, BUILT_IN};
 pub use camera::{Camera, CameraChoice, Projection};
@@ -97,6 +99,8 @@ pub struct Scene {
     pub has_lights: bool,
     /// Cameras with their names, world space.
     pub cameras: Vec<(String, Camera)>,
+    /// Extensions that the file uses.
+    pub extensions: Vec<ExtensionUse>,
     /// What was approximated, ignored or dropped, one sentence each.
     pub warnings: Vec<String>,
 }

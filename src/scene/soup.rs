@@ -164,10 +164,10 @@ impl Soup {
         }
         for (mesh, count) in scene.meshes.iter().zip(flattened).filter(|(_, count)| *count > 0) {
             let name = &mesh.name;
-            soup.warnings.push(format!("dropped {count} instances of mesh '{name}': their transforms flatten them"));
+            soup.warnings.push(format!("ignored: {count} instances of mesh '{name}': their transforms flatten them"));
         }
         if not_finite > 0 {
-            soup.warnings.push(format!("dropped {not_finite} triangles with a corner that is not a finite number"));
+            soup.warnings.push(format!("ignored: {not_finite} triangles with a corner that is not a finite number"));
         }
         if soup.positions.is_empty() {
             (soup.lo, soup.hi) = (DVec3::ZERO, DVec3::ZERO);

@@ -44,7 +44,7 @@ pub(super) fn declared(root: &Value, warnings: &mut Warnings) -> Vec<Declared> {
     let animations = root.get("animations").and_then(Value::as_array);
     let read = |(index, animation): (usize, &Value)| {
         Declared::deserialize(animation).unwrap_or_else(|error| {
-            warnings.add(format!("animations[{index}] is not used: {error}"));
+            warnings.add(format!("ignored: animations[{index}]: {error}"));
             Declared::default()
         })
     };
@@ -166,7 +166,7 @@ impl Document<'_> {
             match self.track(animation, index) {
                 Ok(track) => tracks.extend(track),
                 Err(fault) => {
-                    self.warnings.add(format!("animations[{animation}].channels[{index}] is not used: {fault}"));
+                    self.warnings.add(format!("ignored: animations[{animation}].channels[{index}]: {fault}"));
                 }
             }
         }

@@ -66,7 +66,7 @@ impl Document<'_> {
         if let Some(at) = options.at.filter(|at| !at.is_finite()) {
             return Err(Error::Usage(format!("time {at}: must be a number of seconds")));
         }
-        let mut base = Scene { name, ..Scene::default() };
+        let mut base = Scene { name, extensions: self.extensions(), ..Scene::default() };
         let contents = self.contents();
         let variant = options.variant.as_deref();
         let variant =
@@ -85,11 +85,14 @@ impl Document<'_> {
         base.has_lights = !lights.is_empty();
         for node in hierarchy.members.iter().map(|member| &hierarchy.nodes[member.node]) {
             if let Some((index, Err(fault))) = node.camera.map(|index| (index, &projections[index])) {
-                self.warnings.add(format!("cameras[{index}] is not used: {fault}"));
+                self.warnings.add(format!("ignored: cameras[{index}]: {fault}"));
             }
             if let Some(Err(fault)) = node.light.and_then(|index| lights.get(index)) {
-                self.warnings.add(format!("a light is not used: {fault}"));
+                self.warnings.add(format!("ignored: a light: {fault}"));
             }
+        }
+        if let Some(ignored) = self.warnings.order.iter().find(|text| options.strict && text.starts_with("ignored:")) {
+            return Err(self.refuse(format!("--strict: {ignored}")));
         }
         let file = self.file.to_owned();
         base.warnings = self.warnings.into_lines();
@@ -303,7 +306,7 @@ impl Asset {
         if let Some((index, Ok(projection))) = node.camera.map(|index| (index, &self.projections[index])) {
             match Camera::of_node(world_from_node, *projection) {
                 Ok(camera) => scene.cameras.push((node.name.clone(), camera)),
-                Err(fault) => scene.warnings.push(format!("cameras[{index}] is not used: {fault}")),
+                Err(fault) => scene.warnings.push(format!("ignored: cameras[{index}]: {fault}")),
             }
         }
         if let Some(Ok(light)) = node.light.filter(|_| member.visible).and_then(|index| self.lights.get(index)) {

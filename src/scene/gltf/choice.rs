@@ -19,9 +19,9 @@ pub struct ReadOptions {
     pub at: Option<f64>,
     /// Textures are halved until neither side has more pixels. Default: none is.
     pub max_texture_size: Option<u32>,
-    /// Bytes that the file may make its reader allocate. Default: 8 GiB.
+    /// Bytes that meshes and textures may take once they are read. Default: 2 GiB.
     pub max_memory: Option<u64>,
-    /// A file with anything that is ignored or only approximated is refused.
+    /// A file with anything that is ignored is refused.
     pub strict: bool,
 }
 

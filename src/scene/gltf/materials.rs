@@ -114,7 +114,7 @@ impl Document<'_> {
         let none = Value::Null;
         let factors = Properties(own.0.get("pbrMetallicRoughness").unwrap_or(&none));
         let exact = whitted(own.0).unwrap_or_else(|fault| {
-            self.warnings.add(format!("{path}.extras.whitted is not used: {fault}"));
+            self.warnings.add(format!("ignored: {path}.extras.whitted: {fault}"));
             None
         });
         let strength =

@@ -56,13 +56,13 @@ impl Document<'_> {
             Checked::Invalid => return Err(self.refuse(format!("{place}: its mode is unknown"))),
         };
         if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-            self.warnings.add("left out: points or lines, only triangles are drawn");
+            self.warnings.add("ignored: points or lines, only triangles are drawn");
             return Ok(None);
         }
         // Compressed ones are decoded to a list, whatever they were.
         let mode = if draco::is_compressed(primitive) { Mode::Triangles } else { mode };
         let Some(positions) = self.vectors(place, primitive, "POSITION", None)? else {
-            self.warnings.add(format!("left out: {place} has no POSITION"));
+            self.warnings.add(format!("ignored: {place} has no POSITION"));
             return Ok(None);
         };
         let count = positions.len();
@@ -84,7 +84,7 @@ impl Document<'_> {
         }
         let triangles = triangles(mode, &corners);
         if triangles.is_empty() || (mode == Mode::Triangles && corners.len() % 3 != 0) {
-            self.warnings.add(format!("dropped: {place} has {} corners, not whole triangles", corners.len()));
+            self.warnings.add(format!("ignored: {place} has {} corners, not whole triangles", corners.len()));
         }
         let in_range = |color: &Vec4| color.cmpge(Vec4::ZERO).all() && color.cmple(Vec4::ONE).all();
         if !colors.iter().all(in_range) {

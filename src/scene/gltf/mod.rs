@@ -17,6 +17,7 @@ mod check;
 mod choice;
 mod container;
 mod draco;
+mod extensions;
 mod images;
 mod materials;
 mod meshes;
@@ -29,6 +30,7 @@ mod textures;
 
 pub use asset::Asset;
 pub use choice::{AnimationSummary, Contents, ReadOptions};
+pub use extensions::standing;
 
 use super::Scene;
 use crate::error::{Error, Result};
@@ -39,20 +41,6 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 use std::rc::Rc;
-
-/// Extensions that are shown exactly.
-pub const SUPPORTED_EXTENSIONS: [&str; 10] = [
-    "EXT_mesh_gpu_instancing",
-    "EXT_meshopt_compression",
-    "KHR_draco_mesh_compression",
-    "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_mesh_quantization",
-    "KHR_meshopt_compression",
-    "KHR_node_visibility",
-];
 
 /// Reads a scene from a `.gltf` or `.glb` file, or from standard input for `-` (then without files beside it).
 ///
@@ -109,7 +97,6 @@ pub fn open_bytes(
     document.most_numbers = options.max_memory.map_or(accessor::MOST_NUMBERS, |bytes| bytes / 4);
     document.load(container.binary, folder);
     document.check_data();
-    document.note_what_is_not_shown();
     document.into_asset(name, options)
 }
 
@@ -191,16 +178,6 @@ impl<'a> Document<'a> {
 
     fn refuse(&self, message: impl ToString) -> Error {
         Error::content(self.file, message)
-    }
-
-    /// Warns of all parts of the file that have no influence on the picture yet.
-    fn note_what_is_not_shown(&mut self) {
-        let root = &self.root;
-        for extension in &root.extensions_used {
-            if !SUPPORTED_EXTENSIONS.contains(&extension.as_str()) {
-                self.warnings.add(format!("ignored: extension {extension}"));
-            }
-        }
     }
 }
 

@@ -76,7 +76,7 @@ impl Document<'_> {
                 Err(fault) => faults.push(format!("images[{index}]: {fault}")),
             }
         }
-        faults.into_iter().for_each(|fault| self.warnings.add(format!("{fault}; not shown")));
+        faults.into_iter().for_each(|fault| self.warnings.add(format!("ignored: {fault}")));
         Ok(())
     }
 }

@@ -6,7 +6,8 @@
 mod geometry;
 mod nodes;
 
-use super::{Warnings, SUPPORTED_EXTENSIONS};
+use super::{standing, Warnings};
+use crate::scene::Standing;
 use serde_json::{Map, Value};
 
 /// `Err` unless `asset.version` is 2.x and `minVersion` is 2.0 at most.
@@ -30,7 +31,7 @@ pub(super) fn required_extensions(root: &Value) -> Result<(), String> {
         .into_iter()
         .flatten()
         .filter_map(Value::as_str)
-        .filter(|name| !SUPPORTED_EXTENSIONS.contains(name))
+        .filter(|name| standing(name) == Standing::Ignored)
         .collect();
     if missing.is_empty() {
         return Ok(());
