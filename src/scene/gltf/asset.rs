@@ -66,6 +66,7 @@ impl Document<'_> {
             return Err(Error::Usage(format!("time {at}: must be a number of seconds")));
         }
         let mut base = Scene { name, ..Scene::default() };
+        self.check_bind_matrices();
         let contents = self.contents();
         let variant = options.variant.as_deref();
         let variant =
