@@ -138,8 +138,8 @@ impl Document<'_> {
             );
         }
         let joints = joints.clone();
-        let root = joints.first().map(|joint| hierarchy.root_of(*joint));
-        if root.is_some_and(|root| !hierarchy.members.iter().any(|member| member.node == root)) {
+        let root = joints.first().map(|joint| hierarchy.nodes[*joint].root);
+        if root.is_some_and(|root| !hierarchy.is_member[root]) {
             self.warnings.add(format!("skins[{index}]: its joints do not belong to the scene that is shown"));
         }
         Ok(Skin { joints, joint_from_mesh })

@@ -4,45 +4,53 @@ use super::{list, selected, Warnings};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-/// Joints of a skin must have a common root, and its skeleton, if given, must be one.
+/// A node's topmost ancestor, and the places of its subtree in a depth-first walk.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    root: usize,
+    first: usize,
+    end: usize,
+}
+
+/// Joints of a skin must have a common root, and its skeleton, if given, must be one. There are no cycles any more.
 pub(super) fn skeletons(root: &Value, warnings: &mut Warnings) {
-    let nodes = list(root, "nodes");
-    let mut parents = vec![None; nodes.len()];
-    for (index, node) in nodes.iter().enumerate() {
-        list(node, "children").iter().filter_map(Value::as_u64).for_each(|child| parents[child as usize] = Some(index));
-    }
-    let roots = roots(&parents);
+    let places = places(list(root, "nodes"));
     for (path, skin) in selected(root, "skins.*") {
-        let joints: Vec<usize> =
-            list(skin, "joints").iter().filter_map(Value::as_u64).map(|joint| joint as usize).collect();
-        if joints.windows(2).any(|pair| roots[pair[0]] != roots[pair[1]]) {
+        let joints = list(skin, "joints").iter().filter_map(Value::as_u64).map(|joint| places[joint as usize]);
+        let joints: Vec<Place> = joints.collect();
+        if joints.windows(2).any(|pair| pair[0].root != pair[1].root) {
             warnings.add(format!("{path}: its joints have no common root"));
         }
         let Some(skeleton) = skin.get("skeleton").and_then(Value::as_u64) else { continue };
-        let below = |joint: &usize| {
-            std::iter::successors(Some(*joint), |node| parents[*node]).any(|node| node as u64 == skeleton)
-        };
-        if !joints.iter().all(below) {
+        let above = places[skeleton as usize];
+        if !joints.iter().all(|joint| (above.first..above.end).contains(&joint.first)) {
             warnings.add(format!("{path}.skeleton is not above all of its joints"));
         }
     }
 }
 
-/// The topmost node above each, or itself. There are no cycles.
-fn roots(parents: &[Option<usize>]) -> Vec<usize> {
-    let mut roots: Vec<Option<usize>> =
-        parents.iter().enumerate().map(|(node, up)| up.is_none().then_some(node)).collect();
-    for start in 0..parents.len() {
-        let mut way = Vec::new();
-        let mut node = start;
-        while let (None, Some(parent)) = (roots[node], parents[node]) {
-            way.push(node);
-            node = parent;
+fn places(nodes: &[Value]) -> Vec<Place> {
+    let children =
+        |node: usize| list(&nodes[node], "children").iter().filter_map(Value::as_u64).map(|child| child as usize);
+    let mut is_child = vec![false; nodes.len()];
+    (0..nodes.len()).flat_map(children).for_each(|child| is_child[child] = true);
+    let mut places = vec![Place::default(); nodes.len()];
+    let mut next = 0;
+    for root in (0..nodes.len()).filter(|node| !is_child[*node]) {
+        // Each node is met on the way down and on the way up.
+        let mut stack = vec![(root, false)];
+        while let Some((node, is_done)) = stack.pop() {
+            if is_done {
+                places[node].end = next;
+                continue;
+            }
+            places[node] = Place { root, first: next, end: next };
+            next += 1;
+            stack.push((node, true));
+            stack.extend(children(node).map(|child| (child, false)));
         }
-        let root = roots[node];
-        way.into_iter().for_each(|node| roots[node] = root);
     }
-    roots.into_iter().enumerate().map(|(node, root)| root.unwrap_or(node)).collect()
+    places
 }
 
 /// Variants must have names, and a primitive one material for each.
