@@ -2,7 +2,7 @@
 
 use super::support::{assert_alike, corpus, draw, draw_reference};
 use glam::DVec3;
-use glimt::scene::{gltf, Background, CameraChoice, Soup};
+use glimt::scene::{gltf, Background, CameraChoice, Soup, Standing};
 use glimt::{film, Options, Result, Scene};
 use serde_json::Value;
 use std::collections::BTreeMap;

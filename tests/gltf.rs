@@ -1,6 +1,6 @@
 //! The glTF reader, on files that the tests write themselves.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 use glimt::scene::{gltf, LightKind, Projection};
 use glimt::{Result, Scene};
 use serde_json::{json, Value};
@@ -430,11 +430,12 @@ fn compressed_primitives_replace_their_accessors() {
     assert_eq!(scene.warnings, [""; 0]);
     let mesh = &scene.meshes[0];
     assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.5)]);
-    assert_eq!(mesh.colors, [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.2, 0.4, 0.6)]);
+    let opaque = [Vec3::X, Vec3::Y, Vec3::Z].map(|color| color.extend(1.0));
+    assert_eq!(mesh.colors, [opaque[0], opaque[1], opaque[2], Vec4::new(0.2, 0.4, 0.6, 0.8)]);
     assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3]]);
     // What is not in the compressed data comes from its accessor: here one without data, which is black.
     let scene = read(&document(json!({"bufferView": 0, "attributes": {"POSITION": 0}}))).unwrap();
-    assert_eq!(scene.meshes[0].colors, [Vec3::ZERO; 4]);
+    assert_eq!(scene.meshes[0].colors, [Vec4::ZERO; 4]);
     for (extension, fault) in [
         (json!({"bufferView": 0, "attributes": {"POSITION": 7}}), "POSITION has number 7"),
         (json!({"bufferView": 1, "attributes": {"POSITION": 0}}), "bufferView"),

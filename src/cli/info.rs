@@ -4,7 +4,7 @@ use super::reading::ReadArgs;
 use super::{open_source, Outcome, Source};
 use clap::{Args, ValueHint};
 use glimt::scene::gltf::Contents;
-use glimt::scene::{Image, Instancing, Pixels, Standing, LightKind, Projection, Soup};
+use glimt::scene::{Image, Instancing, LightKind, Pixels, Projection, Soup, Standing};
 use glimt::{Result, Scene};
 use serde::Serialize;
 use std::fmt::Write;
@@ -248,7 +248,11 @@ impl Info {
             ("cameras", &self.cameras, "none: one that frames the scene is used"),
             ("lights", &self.lights, self.without_lights),
             ("materials", &self.materials, "none"),
-            ("faults, and what is approximated or ignored", &self.warnings, "none: all of the file is shown as it says"),
+            (
+                "faults, and what is approximated or ignored",
+                &self.warnings,
+                "none: all of the file is shown as it says",
+            ),
         ];
         for (title, lines, none) in lists {
             let _ = writeln!(text, "{title}:");
@@ -267,7 +271,7 @@ impl InfoArgs {
     /// Reads the scene and describes it.
     pub fn run(self) -> Result<Outcome> {
         let (scene, contents) = match open_source(&self.scene, &self.read.options())? {
-            Source::BuiltIn(scene) => (scene, Contents::default()),
+            Source::BuiltIn(scene) => (*scene, Contents::default()),
             Source::File(asset) => {
                 let contents = asset.contents().clone();
                 (asset.into_scene()?, contents)

@@ -132,7 +132,7 @@ impl Cli {
 
 /// What a scene argument names.
 enum Source {
-    BuiltIn(Scene),
+    BuiltIn(Box<Scene>),
     File(Box<Asset>),
 }
 
@@ -151,7 +151,7 @@ fn open_source(name: &str, options: &ReadOptions) -> Result<Source> {
                 "the built-in scene '{name}' has no animation: it is the same at all times"
             )));
         }
-        return scene::built_in(name).map(Source::BuiltIn);
+        return scene::built_in(name).map(|scene| Source::BuiltIn(Box::new(scene)));
     }
     let asset = scene::gltf::open(Path::new(name), options).map_err(|error| match error {
         Error::Read { path, source } if source.kind() == std::io::ErrorKind::NotFound => Error::Usage(format!(
@@ -167,7 +167,7 @@ fn open_source(name: &str, options: &ReadOptions) -> Result<Source> {
 /// The scene that a scene argument names.
 fn load_scene(name: &str, options: &ReadOptions) -> Result<Scene> {
     match open_source(name, options)? {
-        Source::BuiltIn(scene) => Ok(scene),
+        Source::BuiltIn(scene) => Ok(*scene),
         Source::File(asset) => asset.into_scene(),
     }
 }

@@ -1,6 +1,7 @@
 //! Scene → picture on a Vulkan device: what is needed ([`Plan`]), where it lies (`upload`), in which order it runs (`frame`).
 
 mod frame;
+mod next_tree;
 mod options;
 mod plan;
 mod progressive;

@@ -13,9 +13,9 @@ use rayon::prelude::*;
 
 /// The trees over a soup.
 pub struct Tree {
-    parts: Vec<Part>,
+    pub(super) parts: Vec<Part>,
     /// Over the placements; `None` for a flat soup.
-    upper: Option<Bvh>,
+    pub(super) upper: Option<Bvh>,
     /// From world space to the device's.
     pub rebase: Rebase,
     /// How it was built.
@@ -26,33 +26,29 @@ pub struct Tree {
     pub update: Option<report::TreeUpdate>,
 }
 
-/// A tree is refitted for the next frame of a sequence as long as that makes it cost at most so many times what it did when it was built.
-/// By the heuristic a ray then takes 1.3 times as long; a sequence's frame traces many rays, so that a new tree soon pays.
-const MOST_LOOSE: f64 = 1.3;
-
 /// Rounds of loops that no driver cuts short: Mesa 22.3 ends them after 65 535.
 const MOST_ROUNDS: u64 = 60_000;
 /// Rays that such a driver runs side by side at most.
 const LANES: u64 = 16;
 
 /// The tree over a part of the soup.
-struct Part {
-    bvh: Bvh,
+pub(super) struct Part {
+    pub bvh: Bvh,
     /// From the part's space to the device's for it.
-    rebase: Rebase,
+    pub rebase: Rebase,
     /// Its cost when it was built, where it was refitted since.
-    built_cost: Option<f64>,
+    pub built_cost: Option<f64>,
 }
 
 impl Part {
     /// Its cost when it was built.
-    fn built_cost(&self) -> f64 {
+    pub fn built_cost(&self) -> f64 {
         self.built_cost.unwrap_or_else(|| self.bvh.stats().sah_cost)
     }
 }
 
 /// The triangles of a part as the device sees them, and the space that they are in.
-fn part_space(soup: &Soup, range: &std::ops::Range<usize>, world: Rebase) -> (Vec<[Vec3; 3]>, Rebase) {
+pub(super) fn part_space(soup: &Soup, range: &std::ops::Range<usize>, world: Rebase) -> (Vec<[Vec3; 3]>, Rebase) {
     let positions = &soup.positions[range.clone()];
     let own = || {
         let (lo, hi) = bounds_of(positions);
@@ -64,7 +60,7 @@ fn part_space(soup: &Soup, range: &std::ops::Range<usize>, world: Rebase) -> (Ve
 }
 
 /// The tree over the placements of parts; `None` for a flat soup.
-fn upper_tree(soup: &Soup, parts: &[Part], world: Rebase) -> Option<Bvh> {
+pub(super) fn upper_tree(soup: &Soup, parts: &[Part], world: Rebase) -> Option<Bvh> {
     let world_box = |placement: &Placement| {
         let part = &parts[placement.part];
         world_box(&part.bvh.bounds, &Transforms::new(placement, part.rebase, world))
@@ -187,54 +183,6 @@ impl Tree {
         let parts: Vec<Part> = soup.parts.par_iter().map(part).collect();
         let upper = upper_tree(soup, &parts, rebase);
         Self { parts, upper, rebase, quality, rounds_outward: true, update: None }
-    }
-
-    /// The trees for the next frame of a sequence: these with new boxes if the soup has as many triangles in each part and no
-    /// part's cost exceeds [`MOST_LOOSE`] times its cost when it was built; otherwise new ones.
-    pub fn next(&self, soup: &Soup, rebase: Rebase, quality: Quality) -> Self {
-        let refitted = self.has_parts_of(soup).then(|| self.refitted(soup, rebase));
-        // Of the part that has become loosest.
-        let looseness = |part: &&Part| part.bvh.stats().sah_cost / part.built_cost();
-        let loosest = |tree: &Self| {
-            let by_looseness = |a: &&Part, b: &&Part| looseness(a).total_cmp(&looseness(b));
-            tree.parts.iter().max_by(by_looseness).map(|part| (part.built_cost(), part.bvh.stats().sah_cost))
-        };
-        let costs = refitted.as_ref().and_then(loosest);
-        let update = |action| report::TreeUpdate {
-            action,
-            built_cost: costs.map(|(built, _)| built),
-            refitted_cost: costs.map(|(_, refitted)| refitted),
-        };
-        match (refitted, costs) {
-            (Some(tree), Some((built, now))) if quality == self.quality && now <= MOST_LOOSE * built => {
-                Self { update: Some(update("refitted")), ..tree }
-            }
-            _ => {
-                let tree = Self::build(soup, rebase, quality);
-                Self { update: Some(update("rebuilt")), rounds_outward: self.rounds_outward, ..tree }
-            }
-        }
-    }
-
-    /// The soup has as many triangles in each part as the one that these trees are over.
-    fn has_parts_of(&self, soup: &Soup) -> bool {
-        let primitives = |part: &Part| part.bvh.order.iter().max().map_or(0, |last| *last as usize + 1);
-        self.parts.len() == soup.parts.len()
-            && self.parts.iter().zip(&soup.parts).all(|(part, range)| primitives(part) == range.len())
-    }
-
-    /// The same trees with the boxes of a soup whose triangles have moved.
-    fn refitted(&self, soup: &Soup, rebase: Rebase) -> Self {
-        let part = |(part, range): (&Part, &std::ops::Range<usize>)| {
-            let (triangles, rebase) = part_space(soup, range, rebase);
-            let mut bvh = part.bvh.clone();
-            bvh.refit(&triangles);
-            Part { bvh, rebase, built_cost: Some(part.built_cost()) }
-        };
-        let parts: Vec<Part> = self.parts.par_iter().zip(&soup.parts).map(part).collect();
-        let upper = upper_tree(soup, &parts, rebase);
-        let Self { quality, rounds_outward, .. } = *self;
-        Self { parts, upper, rebase, quality, rounds_outward, update: None }
     }
 
     /// The features with what the trees themselves need.

@@ -43,6 +43,8 @@ pub struct Asset {
 struct Pose {
     world_from_node: Vec<DMat4>,
     weights: Vec<Option<Vec<f64>>>,
+    /// For each skin that is used, from a mesh's space to world space by each joint.
+    joints: Vec<Option<Vec<DMat4>>>,
 }
 
 /// A mesh somewhere.
@@ -67,6 +69,7 @@ impl Document<'_> {
             return Err(Error::Usage(format!("time {at}: must be a number of seconds")));
         }
         let mut base = Scene { name, extensions: self.extensions(), ..Scene::default() };
+        self.check_bind_matrices();
         let contents = self.contents();
         let variant = options.variant.as_deref();
         let variant =
@@ -76,10 +79,10 @@ impl Document<'_> {
         self.add_materials(&mut base);
         let (primitives, shapes) = self.add_meshes(&mut base, variant)?;
         let hierarchy = self.hierarchy(options.scene.as_deref())?;
-        let skins = self.used_skins(&hierarchy, &primitives, &shapes)?;
         self.check_sizes(&hierarchy, &base, &primitives, &shapes)?;
         let visible = visible_materials(&hierarchy, &base, &primitives);
         self.add_images(&mut base, &visible, options)?;
+        let skins = self.used_skins(&hierarchy, &primitives, &shapes)?;
         let tracks = animation.map_or(Vec::new(), |animation| self.tracks(animation));
         let (lights, projections) = (self.read_lights(), self.projections());
         base.has_lights = !lights.is_empty();
@@ -271,20 +274,21 @@ impl Asset {
             let world_from_parent = nodes[*node].parent.map_or(DMat4::IDENTITY, |parent| world_from_node[parent]);
             world_from_node[*node] = world_from_parent * locals[*node].matrix();
         }
-        Pose { world_from_node, weights }
+        let joints = |skin: &Option<Skin>| skin.as_ref().map(|skin| skin.world_from_mesh(&world_from_node));
+        let joints = self.skins.iter().map(joints).collect();
+        Pose { world_from_node, weights, joints }
     }
 
     fn draw_meshes(&self, member: Member, pose: &Pose, scene: &Scene, picture: &mut Picture) {
         let node = &self.hierarchy.nodes[member.node];
         let Some(mesh) = node.mesh else { return };
-        let skin = node.skin.and_then(|skin| self.skins[skin].as_ref());
-        let joints = skin.map(|skin| skin.world_from_mesh(&pose.world_from_node));
+        let joints = node.skin.and_then(|skin| pose.joints[skin].as_deref());
         let weights = pose.weights[member.node].as_ref().unwrap_or(&node.weights);
         let world_from_node = pose.world_from_node[member.node];
         let places = node.places.as_deref().unwrap_or(&[DMat4::IDENTITY]);
         for own in &self.primitives[mesh] {
             let (base, shape) = (&scene.meshes[*own], &self.shapes[*own]);
-            let joints = joints.as_deref().filter(|_| !shape.influences.is_empty());
+            let joints = joints.filter(|_| !shape.influences.is_empty());
             let has_own = joints.is_some() || shape.is_morphed(weights);
             let index = has_own.then(|| {
                 picture.shapes.push((*own, posed(base, shape, weights, joints)));

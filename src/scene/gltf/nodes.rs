@@ -48,6 +48,8 @@ impl Local {
 pub(super) struct Node {
     pub name: String,
     pub parent: Option<usize>,
+    /// The topmost node above it, or itself.
+    pub root: usize,
     pub local: Local,
     /// Index of a glTF mesh.
     pub mesh: Option<usize>,
@@ -78,20 +80,14 @@ pub(super) struct Hierarchy {
     pub order: Vec<usize>,
     /// The chosen scene's nodes, depth first.
     pub members: Vec<Member>,
+    /// For each node, whether the chosen scene has it.
+    pub is_member: Vec<bool>,
 }
 
 impl Hierarchy {
     /// The nodes of the chosen scene that are visible.
     pub fn visible(&self) -> impl Iterator<Item = &Node> {
         self.members.iter().filter(|member| member.visible).map(|member| &self.nodes[member.node])
-    }
-
-    /// The topmost node above a node, or the node itself.
-    pub fn root_of(&self, mut node: usize) -> usize {
-        while let Some(parent) = self.nodes[node].parent {
-            node = parent;
-        }
-        node
     }
 }
 
@@ -108,6 +104,7 @@ impl Document<'_> {
         let mut stack: Vec<usize> = (0..nodes.len()).filter(|node| nodes[*node].parent.is_none()).collect();
         while let Some(node) = stack.pop() {
             order.push(node);
+            nodes[node].root = nodes[node].parent.map_or(node, |parent| nodes[parent].root);
             stack.extend(children(node));
         }
         let roots = self.roots(choice)?;
@@ -128,7 +125,7 @@ impl Document<'_> {
                 nodes[*node].places = self.instance_transforms(*node, &self.root.nodes[*node])?;
             }
         }
-        Ok(Hierarchy { nodes, order, members })
+        Ok(Hierarchy { nodes, order, members, is_member: visited })
     }
 
     fn node(&self, node: &json::Node) -> Node {
@@ -140,6 +137,7 @@ impl Document<'_> {
         Node {
             name: node.name.clone().unwrap_or_default(),
             parent: None,
+            root: 0,
             local: Local::of(node),
             mesh,
             skin: node.skin.map(|skin| skin.value()).filter(|_| mesh.is_some()),

@@ -5,7 +5,7 @@ use super::Document;
 use crate::error::Result;
 use ::gltf::json::mesh::{Primitive, Semantic};
 use ::gltf::json::validation::Checked;
-use glam::{DMat3, DMat4, DVec3, Vec4};
+use glam::{DMat3, DMat4, DVec3, DVec4, Vec4};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -118,6 +118,18 @@ impl Blend {
 }
 
 impl Document<'_> {
+    /// Warns of inverse bind matrices that are no affine transforms.
+    pub fn check_bind_matrices(&mut self) {
+        let accessors: Vec<usize> = self.skins.iter().filter_map(|skin| skin.inverse_bind_matrices).collect();
+        for accessor in accessors {
+            let is_affine = |matrix: &DMat4| matrix.row(3) == DVec4::W;
+            if self.matrices(accessor).is_ok_and(|matrices| !matrices.iter().all(is_affine)) {
+                self.warnings
+                    .add(format!("accessors[{accessor}]: an inverse bind matrix has a last row other than 0 0 0 1"));
+            }
+        }
+    }
+
     /// Reads a skin that a node of the scene uses.
     pub fn skin(&mut self, index: usize, hierarchy: &Hierarchy) -> Result<Skin> {
         let Declared { joints, inverse_bind_matrices, .. } = &self.skins[index];
@@ -132,11 +144,8 @@ impl Document<'_> {
             );
         }
         let joints = joints.clone();
-        let mut roots = joints.iter().map(|joint| hierarchy.root_of(*joint));
-        let first = roots.next();
-        if roots.any(|root| Some(root) != first) {
-            self.warnings.add(format!("skins[{index}]: its joints have no common root"));
-        } else if first.is_some_and(|root| !hierarchy.members.iter().any(|member| member.node == root)) {
+        let root = joints.first().map(|joint| hierarchy.nodes[*joint].root);
+        if root.is_some_and(|root| !hierarchy.is_member[root]) {
             self.warnings.add(format!("skins[{index}]: its joints do not belong to the scene that is shown"));
         }
         Ok(Skin { joints, joint_from_mesh })

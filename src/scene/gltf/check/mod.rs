@@ -4,6 +4,7 @@
 //! any other is a warning.
 
 mod geometry;
+mod motion;
 mod nodes;
 
 use super::{standing, Warnings};
@@ -51,6 +52,8 @@ pub(super) fn document(root: &Value, has_binary: bool, warnings: &mut Warnings) 
     nodes::nodes(root, warnings)?;
     nodes::cameras_and_lights(root, warnings);
     nodes::skins_and_animations(root, warnings);
+    motion::skeletons(root, warnings);
+    motion::variants(root, warnings);
     nodes::materials(root, warnings);
     nodes::images(root, warnings);
     Ok(())
