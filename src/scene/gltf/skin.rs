@@ -1,7 +1,8 @@
 //! Skins: vertices that follow several joints at once (glTF 2.0, 3.7.3).
 
+use super::accessor::Elements;
 use super::nodes::Hierarchy;
-use super::Document;
+use super::{draco, Document};
 use crate::error::Result;
 use ::gltf::json::mesh::{Primitive, Semantic};
 use ::gltf::json::validation::Checked;
@@ -160,7 +161,10 @@ impl Document<'_> {
         let mut influences =
             Influences { per_vertex, joints: vec![0; per_vertex * count], weights: vec![0.0; per_vertex * count] };
         for (set, (joints, weights)) in pairs.into_iter().enumerate() {
-            let (own_joints, own_weights) = (self.joints(joints)?, self.floats(weights)?);
+            let (own_joints, own_weights) = match self.compressed_influences(primitive, set)? {
+                Some(compressed) => compressed,
+                None => (self.joints(joints)?, self.floats(weights)?),
+            };
             if own_joints.len() != 4 * count || own_weights.components != 4 || own_weights.values.len() != 4 * count {
                 let message = format!("{place}: JOINTS_{set} and WEIGHTS_{set} must be four numbers for each POSITION");
                 return Err(self.refuse(message));
@@ -173,6 +177,17 @@ impl Document<'_> {
         }
         self.normalise(place, &mut influences);
         Ok(influences)
+    }
+
+    /// Joints and weights of a compressed primitive.
+    fn compressed_influences(&self, primitive: &Primitive, set: u32) -> Result<Option<(Vec<u32>, Elements<f32>)>> {
+        if !draco::is_compressed(primitive) {
+            return Ok(None);
+        }
+        let attribute = |name: &str| self.attribute(primitive, &format!("{name}_{set}"));
+        let (joints, weights) = (attribute("JOINTS")?, attribute("WEIGHTS")?);
+        let whole = |joints: Elements<f32>| joints.values.into_iter().map(|joint| joint as u32).collect();
+        Ok(joints.map(whole).zip(weights))
     }
 
     /// Makes weights sum to 1 and warns where they were far from it.
