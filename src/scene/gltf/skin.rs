@@ -161,7 +161,7 @@ impl Document<'_> {
         let mut influences =
             Influences { per_vertex, joints: vec![0; per_vertex * count], weights: vec![0.0; per_vertex * count] };
         for (set, (joints, weights)) in pairs.into_iter().enumerate() {
-            let (own_joints, own_weights) = match self.compressed_influences(primitive, set)? {
+            let (own_joints, own_weights) = match self.compressed_influences(primitive, set as u32)? {
                 Some(compressed) => compressed,
                 None => (self.joints(joints)?, self.floats(weights)?),
             };
