@@ -7,6 +7,7 @@
 //! * `gltf` — accessors of every kind, hierarchies, faults, written by the tests themselves
 //! * `poses` — animations, skins, morph targets against values computed by hand; variants, visibility, sequences
 //! * `frames` — pictures: against the reference, closed forms, determinism, features
+//! * `textures` — samplers, maps, alpha and coloured shadows, against the reference and closed forms
 //! * `hard_scenes` — pictures that are hard on trees, stacks and f32
 //! * `measuring` — bench, stress and study as programs
 //! * `stress` — extreme cases hold, and fail without their safeguards
@@ -30,3 +31,4 @@ mod scene;
 mod stress;
 mod study;
 mod support;
+mod textures;

@@ -4,8 +4,10 @@
 struct Veil {
     /// Share of the light that meets the surface: 0 or 1 with a mask.
     float alpha;
-    /// Colour of what passes where it meets the surface.
+    /// Colour of the surface.
     vec3 color;
+    /// Colour of what passes where it meets the surface.
+    vec3 inside;
     /// Share of that which passes.
     float transmission;
 };
@@ -37,16 +39,17 @@ Veil veil_at(uint primitive, uint word, vec2 barycentrics) {
             metallic *= map_at(maps.y, place).b;
     }
     float alpha = last.y == ALPHA_BLEND ? clamp(color.a, 0.0, 1.0) : last.y == ALPHA_MASK && color.a < cutoff ? 0.0 : 1.0;
-    return Veil(alpha, color.rgb, transmission * (1.0 - metallic));
+    vec3 attenuation = FETCH_FLOATS(materials, first + 6u).xyz;
+    return Veil(alpha, color.rgb, color.rgb * attenuation, transmission * (1.0 - metallic));
 }
 
 /// What is seen of things behind it: the share that does not meet the surface, and what passes it, tinted.
 vec3 seen_through(Veil veil) {
-    return vec3(1.0 - veil.alpha) + veil.alpha * veil.transmission * veil.color;
+    return vec3(1.0 - veil.alpha) + veil.alpha * veil.transmission * veil.inside;
 }
 
 /// What passes of light on its way: a blended surface also colours what does not meet it, the more so the more there is of it, as stained
 /// glass does.
 vec3 light_through(Veil veil) {
-    return (1.0 - veil.alpha) * mix(vec3(1.0), veil.color, veil.alpha) + veil.alpha * veil.transmission * veil.color;
+    return (1.0 - veil.alpha) * mix(vec3(1.0), veil.color, veil.alpha) + veil.alpha * veil.transmission * veil.inside;
 }

@@ -19,7 +19,7 @@ const uint NODE_TEXELS = 2u;
 /// Texels in one triangle of the traversal, and in one triangle's normals, colours, texture coordinates or tangents.
 const uint TRIANGLE_TEXELS = 3u;
 /// Texels in a Material and the Look behind it.
-const uint MATERIAL_TEXELS = 12u;
+const uint MATERIAL_TEXELS = 13u;
 /// The first of a Look's among them.
 const uint LOOK_TEXEL = 6u;
 /// Texels in a Texture.
@@ -270,6 +270,10 @@ struct Look {
     uint follows_rule;
     /// Fills the texel.
     uint unused;
+    /// Colour that light takes on inside, on its way through.
+    vec3 attenuation;
+    /// Fills the texel.
+    uint unused_too;
 };
 
 /// A texture in one of its uses. Whole texels.

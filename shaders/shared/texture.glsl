@@ -32,12 +32,10 @@ vec3 linear_from_srgb(vec3 color) {
 /// A pixel of a level.
 vec4 pixel_at(Level level, ivec2 place) {
     uint index = uint(place.y * level.size.x + place.x);
-    if ((level.flags & TEXTURE_WIDE) != 0u) {
-        uvec4 two = FETCH(pixels, level.first + (index >> 1u));
-        uvec2 wide = (index & 1u) != 0u ? two.zw : two.xy;
-        return vec4(unpackUnorm2x16(wide.x), unpackUnorm2x16(wide.y));
-    }
-    vec4 pixel = unpackUnorm4x8(FETCH(pixels, level.first + (index >> 2u))[index & 3u]);
+    bool is_wide = (level.flags & TEXTURE_WIDE) != 0u;
+    uvec4 texel = FETCH(pixels, level.first + (index >> (is_wide ? 1u : 2u)));
+    uvec2 wide = (index & 1u) != 0u ? texel.zw : texel.xy;
+    vec4 pixel = is_wide ? vec4(unpackUnorm2x16(wide.x), unpackUnorm2x16(wide.y)) : unpackUnorm4x8(texel[index & 3u]);
     return (level.flags & TEXTURE_SRGB) != 0u ? vec4(linear_from_srgb(pixel.rgb), pixel.a) : pixel;
 }
 

@@ -188,7 +188,7 @@ impl Tracer<'_> {
             let veil = self.veil(primitive, weights_of((u, v)));
             let clear = 1.0 - veil.alpha;
             let stained = DVec3::ONE * clear + veil.color * veil.alpha;
-            passed *= clear * stained + veil.alpha * veil.transmission * veil.color;
+            passed *= clear * stained + veil.alpha * veil.transmission * veil.inside;
             if passed.max_element() < NO_LIGHT {
                 return DVec3::ZERO;
             }
@@ -235,7 +235,7 @@ impl Tracer<'_> {
         }
         let (alpha, through) = if self.soup.flags[hit.primitive].see_through {
             let veil = self.veil(hit.primitive, hit.weights());
-            (veil.alpha, DVec3::splat(1.0 - veil.alpha) + veil.color * (veil.alpha * veil.transmission))
+            (veil.alpha, DVec3::splat(1.0 - veil.alpha) + veil.inside * (veil.alpha * veil.transmission))
         } else {
             (1.0, DVec3::ZERO)
         };

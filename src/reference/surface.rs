@@ -26,6 +26,8 @@ pub(super) struct Surface {
 pub(super) struct Veil {
     pub alpha: f64,
     pub color: DVec3,
+    /// Colour of what passes inside.
+    pub inside: DVec3,
     pub transmission: f64,
 }
 
@@ -83,7 +85,8 @@ impl Tracer<'_> {
         let passes = if material.unlit || material.whitted.is_some() { 0.0 } else { material.transmission };
         let metallic = material.metallic * self.map(maps.metallic_roughness, false, &spot).z;
         let transmission = passes * self.map(maps.transmission, false, &spot).x * (1.0 - metallic);
-        Veil { alpha, color: color.truncate(), transmission }
+        let inside = color.truncate() * material.attenuation();
+        Veil { alpha, color: color.truncate(), inside, transmission }
     }
 
     /// The surface at a hit, seen by a ray whose cone has travelled this far.

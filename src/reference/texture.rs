@@ -109,18 +109,16 @@ impl Reader<'_> {
     }
 
     fn color(&self, pixels: &Pixels, index: usize) -> DVec4 {
-        match pixels {
-            Pixels::Rgba16(pixels) => DVec4::from_array(pixels[index].map(|value| f64::from(value) / 65535.0)),
-            Pixels::Rgba8(pixels) => {
-                let [r, g, b, a] = pixels[index].map(|value| f64::from(value) / 255.0);
-                let light = |value: f64| match self.is_srgb {
-                    false => value,
-                    true if value <= 0.04045 => value / 12.92,
-                    true => ((value + 0.055) / 1.055).powf(2.4),
-                };
-                DVec4::new(light(r), light(g), light(b), a)
-            }
-        }
+        let [r, g, b, a] = match pixels {
+            Pixels::Rgba16(pixels) => pixels[index].map(|value| f64::from(value) / 65535.0),
+            Pixels::Rgba8(pixels) => pixels[index].map(|value| f64::from(value) / 255.0),
+        };
+        let light = |value: f64| match self.is_srgb {
+            false => value,
+            true if value <= 0.04045 => value / 12.92,
+            true => ((value + 0.055) / 1.055).powf(2.4),
+        };
+        DVec4::new(light(r), light(g), light(b), a)
     }
 }
 

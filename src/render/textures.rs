@@ -124,7 +124,7 @@ fn record(texture: &scene::Texture, used: &UsedMap, firsts: &[u32], size: (u32, 
         (!texture.minify.linear, TEXTURE_MINIFY_NEAREST),
         (texture.minify.mipmap.is_some(), TEXTURE_MIPMAP),
         (texture.minify.mipmap == Some(false), TEXTURE_LEVEL_NEAREST),
-        (used.is_srgb && !is_wide, TEXTURE_SRGB),
+        (used.is_srgb, TEXTURE_SRGB),
         (is_wide, TEXTURE_WIDE),
         (used.map.texcoord == 1, TEXTURE_SECOND_SET),
     ];

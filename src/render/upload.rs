@@ -211,6 +211,8 @@ impl Scene<'_> {
             alpha_mode,
             follows_rule: u32::from(follows_rule),
             unused: 0,
+            attenuation: material.attenuation().as_vec3().into(),
+            unused_too: 0,
         };
         MaterialAndLook { material: coefficients, look }
     }

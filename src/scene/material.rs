@@ -131,6 +131,14 @@ impl Material {
         (self.specular_color * ratio * ratio).min(DVec3::ONE) * self.specular
     }
 
+    /// Colour that light takes on inside a volume as thick as its factor says (KHR_materials_volume, Beer's law).
+    pub fn attenuation(&self) -> DVec3 {
+        self.lobes.volume.map_or(DVec3::ONE, |volume| {
+            let lengths = volume.thickness / volume.attenuation_distance;
+            volume.attenuation_color.map(|channel| if lengths > 0.0 { channel.powf(lengths) } else { 1.0 })
+        })
+    }
+
     /// Light may pass the surface, or parts of it are not there.
     pub fn is_see_through(&self) -> bool {
         self.alpha_mode != AlphaMode::Opaque || self.lets_light_through()

@@ -15,24 +15,26 @@ impl Mipmaps {
     pub fn of(image: &Image, is_srgb: bool) -> Self {
         let mut levels = vec![(image.width, image.height, image.pixels.clone())];
         while let Some((width, height, pixels)) = levels.last().filter(|(width, height, _)| *width > 1 || *height > 1) {
+            let size = (*width, *height);
             let smaller = match pixels {
                 Pixels::Rgba8(pixels) => {
-                    let light: Vec<f32> = (0..=255_u8).map(|value| decode(value, is_srgb)).collect();
-                    let decoded =
-                        |[r, g, b, a]: [u8; 4]| [light[r as usize], light[g as usize], light[b as usize], f32::from(a)];
-                    Pixels::Rgba8(halved(*width, *height, pixels, decoded, |mean| {
-                        let [r, g, b, a] = mean;
-                        let color = [r, g, b].map(|value| encode(value, is_srgb));
-                        [color[0], color[1], color[2], a.round() as u8]
+                    let light: Vec<f32> = (0..=255_u8).map(|value| decode(f32::from(value) / 255.0, is_srgb)).collect();
+                    let decoded = |[r, g, b, a]: [u8; 4]| {
+                        [light[r as usize], light[g as usize], light[b as usize], f32::from(a) / 255.0]
+                    };
+                    Pixels::Rgba8(halved(size, pixels, decoded, |mean| {
+                        encoded(mean, is_srgb).map(|value| (255.0 * value).round() as u8)
                     }))
                 }
-                Pixels::Rgba16(pixels) => Pixels::Rgba16(halved(
-                    *width,
-                    *height,
-                    pixels,
-                    |pixel| pixel.map(f32::from),
-                    |mean| mean.map(|value| value.round() as u16),
-                )),
+                Pixels::Rgba16(pixels) => {
+                    let decoded = |pixel: [u16; 4]| {
+                        let [r, g, b, a] = pixel.map(|value| f32::from(value) / 65535.0);
+                        [decode(r, is_srgb), decode(g, is_srgb), decode(b, is_srgb), a]
+                    };
+                    Pixels::Rgba16(halved(size, pixels, decoded, |mean| {
+                        encoded(mean, is_srgb).map(|value| (65535.0 * value).round() as u16)
+                    }))
+                }
             };
             levels.push(((width / 2).max(1), (height / 2).max(1), smaller));
         }
@@ -56,8 +58,7 @@ fn covered(place: u32, from: u32, to: u32) -> (u32, [f32; 3]) {
 
 /// A level half as wide and high.
 fn halved<T: Copy + Send + Sync>(
-    width: u32,
-    height: u32,
+    (width, height): (u32, u32),
     pixels: &[T],
     decoded: impl Fn(T) -> [f32; 4] + Sync,
     encoded: impl Fn([f32; 4]) -> T + Sync,
@@ -84,24 +85,23 @@ fn halved<T: Copy + Send + Sync>(
     (0..down).into_par_iter().flat_map_iter(row).collect()
 }
 
-/// Light of a colour channel, 0 to 255 for numbers, 0 to 1 for sRGB (IEC 61966-2-1).
-fn decode(value: u8, is_srgb: bool) -> f32 {
-    let share = f32::from(value) / 255.0;
+/// Light of a colour channel, both 0 to 1 (IEC 61966-2-1).
+fn decode(value: f32, is_srgb: bool) -> f32 {
     match is_srgb {
-        false => f32::from(value),
-        true if share <= 0.04045 => share / 12.92,
-        true => ((share + 0.055) / 1.055).powf(2.4),
+        false => value,
+        true if value <= 0.04045 => value / 12.92,
+        true => ((value + 0.055) / 1.055).powf(2.4),
     }
 }
 
-/// Undoes [`decode`].
-fn encode(light: f32, is_srgb: bool) -> u8 {
-    let value = match is_srgb {
+/// Undoes [`decode`] on a pixel's colours.
+fn encoded([r, g, b, a]: [f32; 4], is_srgb: bool) -> [f32; 4] {
+    let encode = |light: f32| match is_srgb {
         false => light,
-        true if light <= 0.003_130_8 => 255.0 * 12.92 * light,
-        true => 255.0 * (1.055 * light.powf(1.0 / 2.4) - 0.055),
+        true if light <= 0.003_130_8 => 12.92 * light,
+        true => 1.055 * light.powf(1.0 / 2.4) - 0.055,
     };
-    value.round() as u8
+    [encode(r), encode(g), encode(b), a]
 }
 
 #[cfg(test)]

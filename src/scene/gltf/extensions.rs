@@ -24,7 +24,7 @@ const KNOWN: [(&str, Standing); 26] = [
     ("KHR_materials_transmission", Approximated("light goes straight through, tinted, neither refracted nor blurred")),
     ("KHR_materials_unlit", Exact),
     ("KHR_materials_variants", Exact),
-    ("KHR_materials_volume", Approximated("neither thickness nor attenuation is shown")),
+    ("KHR_materials_volume", Approximated("light is tinted as by the thickness factor, wherever it passes")),
     ("KHR_mesh_quantization", Exact),
     ("KHR_meshopt_compression", Exact),
     ("KHR_node_visibility", Exact),
