@@ -9,12 +9,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 
 fn main() -> ExitCode {
-    let context = cli::Context { started: std::time::Instant::now(), interrupted: Arc::new(AtomicBool::new(false)) };
+    let context =
+        cli::Context { started: std::time::Instant::now(), interrupted: Arc::new(AtomicBool::new(false)), print };
     let command = match cli::Cli::try_parse() {
         Ok(command) => command,
         Err(answer) if !answer.use_stderr() => answer.exit(),
         Err(error) => {
-            say(&format!("glimt: {}\n", one_line(&error)));
+            say(&format!("glimt: {} (see glimt --help)\n", cli::one_line(&error)));
             return ExitCode::from(2);
         }
     };
@@ -32,8 +33,7 @@ fn main() -> ExitCode {
     }
     match command.run(&context) {
         Ok(outcome) => {
-            let mut stdout = std::io::stdout().lock();
-            let written = stdout.write_all(&outcome.stdout).and_then(|()| stdout.flush());
+            let written = print(&outcome.stdout);
             say(&outcome.stderr);
             match written {
                 // A reader that closes the pipe has what it wants.
@@ -51,17 +51,14 @@ fn main() -> ExitCode {
     }
 }
 
+/// Writes to standard output, at once.
+fn print(results: &[u8]) -> std::io::Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(results)?;
+    stdout.flush()
+}
+
 /// Writes to standard error; nobody can be told when that fails.
 fn say(text: &str) {
     let _ = std::io::stderr().write_all(text.as_bytes());
-}
-
-/// What is wrong with the command line and the tip, if there is one, without the usage.
-fn one_line(error: &clap::Error) -> String {
-    let text = error.to_string();
-    let lines =
-        text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage") && !line.starts_with("For more"));
-    let said: Vec<&str> =
-        lines.filter(|line| !line.is_empty()).map(|line| line.trim_start_matches("error: ")).collect();
-    format!("{} (see glimt --help)", said.join("; "))
 }

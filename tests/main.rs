@@ -13,11 +13,13 @@
 //! * `stress` — extreme cases hold, and fail without their safeguards
 //! * `study` — slopes, knobs, estimated against true error
 //! * `cli` — the program: exit codes, messages, files
+//! * `batch` — JSON jobs in, answers and pictures out, in one process: order, faults, limits, line by line
 //! * `corpus` — real and broken files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
 
 mod architecture;
+mod batch;
 mod bvh;
 mod cli;
 mod corpus;

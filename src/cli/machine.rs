@@ -1,12 +1,13 @@
 //! Flags that choose the machine that computes, the same for every command that does.
 
 use clap::Args;
+use glimt::vulkan::DeviceChoice;
 use glimt::{Error, Result};
 
 /// Device and threads.
 #[derive(Args)]
 pub struct MachineArgs {
-    /// Device by index or part of its name; `render` also knows `reference`, the slow f64 renderer [default: the best]
+    /// Device by index or part of its name; `render` and `batch` also know `reference`, the slow f64 renderer [default: the best]
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
     /// Switch the Vulkan validation layers on; any message of theirs is an error
@@ -18,6 +19,15 @@ pub struct MachineArgs {
 }
 
 impl MachineArgs {
+    /// The device to open; `None` for the reference renderer, which needs none.
+    pub fn choice(&self) -> Option<DeviceChoice> {
+        match self.device.as_deref() {
+            Some("reference") => None,
+            Some(name) => Some(DeviceChoice::Named(name.into())),
+            None => Some(DeviceChoice::Best),
+        }
+    }
+
     /// Sets the number of threads, of host work and of software Vulkan.
     ///
     /// # Errors

@@ -1,11 +1,14 @@
 //! The command line: one file a subcommand, each turning flags into options and results into text.
 
+mod batch;
 mod bench;
 mod completions;
 mod devices;
 mod diff;
 mod explain;
 mod info;
+mod job;
+mod lines;
 mod machine;
 mod progress;
 mod reading;
@@ -30,6 +33,19 @@ pub struct Context {
     pub started: Instant,
     /// Set by Ctrl-C.
     pub interrupted: Arc<AtomicBool>,
+    /// Prints results at once, for commands that go on after them.
+    pub print: fn(&[u8]) -> std::io::Result<()>,
+}
+
+impl Context {
+    /// Prints results at once; false when nobody reads them any more.
+    fn tell(&self, results: &[u8]) -> Result<bool> {
+        match (self.print)(results) {
+            Ok(()) => Ok(true),
+            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(false),
+            Err(error) => Err(Error::write(Path::new("standard output"), error)),
+        }
+    }
 }
 
 /// What a command leaves to be printed.
@@ -63,6 +79,7 @@ Examples:
   glimt render cornell --json | jq .times_ms        one JSON object on standard output
   cat model.glb | glimt render - -o - > out.png     from a pipe to a pipe
   glimt render model.glb --frames 0..48 --fps 24 -o 'frame_{:04}.png'    a sequence of its animation
+  glimt batch < jobs.jsonl                          many pictures in one process: a JSON job a line
   glimt explain model.glb                           what is computed, what is left out, and why
   glimt bench model.glb --sets primary,shadow        how fast rays of a view are traced
   glimt stress --quick                              which extreme cases hold on this device
@@ -84,6 +101,8 @@ pub struct Cli {
 enum Command {
     /// Render a scene to a PNG, OpenEXR or Radiance HDR file
     Render(render::RenderArgs),
+    /// Render many pictures in one process: a JSON job a line on standard input, a JSON answer a line on standard output
+    Batch(batch::BatchArgs),
     /// Say what is in a scene, what will be used, approximated and ignored
     Info(info::InfoArgs),
     /// Say what the renderer does for a scene: passes, buffers, features, and what it leaves out and why
@@ -107,7 +126,12 @@ impl Cli {
     pub fn writes_files(&self) -> bool {
         matches!(
             self.command,
-            Command::Render(_) | Command::Diff(_) | Command::Bench(_) | Command::Stress(_) | Command::Study(_)
+            Command::Render(_)
+                | Command::Batch(_)
+                | Command::Diff(_)
+                | Command::Bench(_)
+                | Command::Stress(_)
+                | Command::Study(_)
         )
     }
 
@@ -118,6 +142,7 @@ impl Cli {
     pub fn run(self, context: &Context) -> Result<Outcome> {
         match self.command {
             Command::Render(args) => args.run(context),
+            Command::Batch(args) => args.run(context),
             Command::Info(args) => args.run(),
             Command::Explain(args) => args.run(),
             Command::Devices(args) => args.run(),
@@ -177,6 +202,16 @@ fn stop_if_interrupted(options: &Options) -> Result<()> {
         true => Err(Error::Interrupted),
         false => Ok(()),
     }
+}
+
+/// What is wrong with arguments and the tip, if there is one, without the usage.
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let lines =
+        text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage") && !line.starts_with("For more"));
+    let said: Vec<&str> =
+        lines.filter(|line| !line.is_empty()).map(|line| line.trim_start_matches("error: ")).collect();
+    said.join("; ")
 }
 
 /// What was typed, for pages that say how they were made.

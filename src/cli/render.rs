@@ -5,7 +5,7 @@ use super::view::ViewArgs;
 use super::{load_scene, milliseconds, progress, sequence, stop_if_interrupted, Context, Outcome};
 use clap::{Args, ValueHint};
 use glimt::film::{Film, Format, Saved};
-use glimt::render::{describe, Prepared, Renderer};
+use glimt::render::{describe, Prepared, Renderer, Tree};
 use glimt::scene::{Background, Soup};
 use glimt::vulkan::DeviceChoice;
 use glimt::{reference, report, Error, Options, Report, Result, Scene};
@@ -61,44 +61,26 @@ fn bits(text: &str) -> Result<u8, String> {
 impl RenderArgs {
     /// Renders, writes, reports.
     pub fn run(self, context: &Context) -> Result<Outcome> {
-        let mut options = self.view.options()?;
+        let mut options = self.options(context.started)?;
         options.validate = self.machine.validate;
         options.interrupted = context.interrupted.clone();
         options.progress = if self.quiet { None } else { progress::bar() };
-        options.target_error = self.target_error;
-        options.deadline = self.max_time.map(|seconds| deadline(context.started, seconds)).transpose()?;
         if let Some(frames) = &self.frames {
             return self.run_sequence(frames.clone(), options, context);
         }
-        let target = Target::of(&self)?;
-        if target.format == Format::Hdr && options.background == Background::Transparent {
-            return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
-        }
-        self.machine.set_threads()?;
-
-        let (film, mut report) = match self.machine.device.as_deref() {
-            Some("reference") if options.target_error.is_some() || options.deadline.is_some() => {
-                return Err(Error::Usage(
-                    "the reference renders --spp samples, not until an error or a time is reached".into(),
-                ));
-            }
-            Some("reference") => self.on_reference(&options)?,
-            device => {
-                options.device = device.map_or(DeviceChoice::Best, |name| DeviceChoice::Named(name.into()));
-                self.on_device(&options)?
-            }
-        };
-        let start = Instant::now();
         let mut outcome = Outcome::default();
-        let saved = target.save(&film, &notes(&report), &mut outcome.stdout, || stop_if_interrupted(&options))?;
-        report.times_ms.save = milliseconds(start);
-        report.times_ms.total = milliseconds(context.started);
-        report.image.path = target.path.display().to_string();
-        report.image.sha256 = saved.sha256;
+        let may_finish = || stop_if_interrupted(&options);
+        let report = self.picture(&options, context.started, &mut outcome.stdout, may_finish, || {
+            self.machine.set_threads()?;
+            match self.machine.choice() {
+                None => self.on_reference(&options),
+                Some(device) => self.on_device(&device, &options),
+            }
+        })?;
         if self.json {
             outcome.stdout = Outcome::json(&report)?.stdout;
-        } else if !target.is_stdout && !self.quiet {
-            outcome.stdout = format!("{}\n", target.path.display()).into_bytes();
+        } else if report.image.path != "-" && !self.quiet {
+            outcome.stdout = format!("{}\n", report.image.path).into_bytes();
         }
         if !self.quiet && !self.json {
             outcome.stderr = report.text() + "\n";
@@ -106,27 +88,62 @@ impl RenderArgs {
         Ok(outcome)
     }
 
+    /// Options of a picture that is begun at `started`, without a device.
+    pub(super) fn options(&self, started: Instant) -> Result<Options> {
+        let mut options = self.view.options()?;
+        options.target_error = self.target_error;
+        options.deadline = self.max_time.map(|seconds| deadline(started, seconds)).transpose()?;
+        Ok(options)
+    }
+
+    /// Finds out where the picture goes, has it drawn, writes it unless it may not be finished, reports.
+    pub(super) fn picture(
+        &self,
+        options: &Options,
+        started: Instant,
+        stdout: &mut Vec<u8>,
+        may_finish: impl FnOnce() -> Result<()>,
+        draw: impl FnOnce() -> Result<(Film, Report)>,
+    ) -> Result<Report> {
+        let target = Target::of(self)?;
+        if target.format == Format::Hdr && options.background == Background::Transparent {
+            return Err(Error::Usage("Radiance HDR has no alpha: write a transparent picture as .png or .exr".into()));
+        }
+        let (film, mut report) = draw()?;
+        let start = Instant::now();
+        let saved = target.save(&film, &notes(&report), stdout, may_finish)?;
+        report.times_ms.save = milliseconds(start);
+        report.times_ms.total = milliseconds(started);
+        report.image.path = target.path.display().to_string();
+        report.image.sha256 = saved.sha256;
+        Ok(report)
+    }
+
     /// The scene is read and its tree built while the device opens.
-    fn on_device(&self, options: &Options) -> Result<(Film, Report)> {
+    fn on_device(&self, device: &DeviceChoice, options: &Options) -> Result<(Film, Report)> {
         std::thread::scope(|threads| {
-            let device = threads.spawn(|| Renderer::new(&options.device, options.validate));
-            let start = Instant::now();
-            let (scene, prepared) = self.load(options)?;
-            let load = milliseconds(start);
-            let start = Instant::now();
-            let tree = prepared.tree(options);
-            let bvh_ms = milliseconds(start);
-            stop_if_interrupted(options)?;
-            let renderer = device.join().map_err(|_| Error::Device("opening it failed".into()))??;
-            let (film, mut report) = renderer.render_with_tree(&scene, &prepared, options, &tree)?;
-            (report.times_ms.load, report.times_ms.bvh) = (load, bvh_ms);
-            Ok((film, report))
+            let renderer = threads.spawn(|| Renderer::new(device, options.validate));
+            let ready = self.ready(options)?;
+            let renderer = renderer.join().map_err(|_| Error::Device("opening it failed".into()))??;
+            ready.draw(&renderer, options)
         })
     }
 
-    fn on_reference(&self, options: &Options) -> Result<(Film, Report)> {
+    /// On a device that is open.
+    pub(super) fn on_renderer(&self, renderer: &Renderer, options: &Options) -> Result<(Film, Report)> {
+        self.ready(options)?.draw(renderer, options)
+    }
+
+    /// By the reference renderer.
+    pub(super) fn on_reference(&self, options: &Options) -> Result<(Film, Report)> {
+        if options.target_error.is_some() || options.deadline.is_some() {
+            return Err(Error::Usage(
+                "the reference renders --spp samples, not until an error or a time is reached".into(),
+            ));
+        }
         let start = Instant::now();
         let scene = load_scene(&self.scene, &self.view.read.options())?;
+        options.check_triangles(&scene)?;
         // Not prepared for any device: every triangle as it is.
         let soup = Soup::of(&scene)?;
         let view = options.view(&scene, &soup)?;
@@ -144,11 +161,35 @@ impl RenderArgs {
         Ok((film, report))
     }
 
-    fn load(&self, options: &Options) -> Result<(Scene, Prepared)> {
+    /// Reads the scene and builds its tree.
+    fn ready(&self, options: &Options) -> Result<Ready> {
+        let start = Instant::now();
         let scene = load_scene(&self.scene, &self.view.read.options())?;
         stop_if_interrupted(options)?;
         let prepared = Prepared::new(&scene, options)?;
-        Ok((scene, prepared))
+        let load = milliseconds(start);
+        let start = Instant::now();
+        let tree = prepared.tree(options);
+        let bvh = milliseconds(start);
+        stop_if_interrupted(options)?;
+        Ok(Ready { scene, prepared, tree, load, bvh })
+    }
+}
+
+/// What can be done of a picture without a device, and the milliseconds it took.
+struct Ready {
+    scene: Scene,
+    prepared: Prepared,
+    tree: Tree,
+    load: f64,
+    bvh: f64,
+}
+
+impl Ready {
+    fn draw(&self, renderer: &Renderer, options: &Options) -> Result<(Film, Report)> {
+        let (film, mut report) = renderer.render_with_tree(&self.scene, &self.prepared, options, &self.tree)?;
+        (report.times_ms.load, report.times_ms.bvh) = (self.load, self.bvh);
+        Ok((film, report))
     }
 }
 

@@ -6,7 +6,6 @@ use glimt::film::Format;
 use glimt::render::{Prepared, Renderer, Tree};
 use glimt::scene::gltf::Asset;
 use glimt::scene::{Background, CameraChoice};
-use glimt::vulkan::DeviceChoice;
 use glimt::{report, Error, Options, Report, Result};
 use std::fmt::Write;
 use std::ops::Range;
@@ -83,10 +82,10 @@ impl RenderArgs {
         if format == Format::Hdr && options.background == Background::Transparent {
             return Err(Error::Usage("Radiance HDR has no alpha: write transparent pictures as .png or .exr".into()));
         }
-        let device = match self.machine.device.as_deref() {
-            Some("reference") => return Err(Error::Usage("the reference renders one picture, not --frames".into())),
-            device => device.map_or(DeviceChoice::Best, |name| DeviceChoice::Named(name.into())),
-        };
+        let device = self
+            .machine
+            .choice()
+            .ok_or_else(|| Error::Usage("the reference renders one picture, not --frames".into()))?;
         self.machine.set_threads()?;
         let (first, validate) = (self.time(frames.start), options.validate);
         let mut sequence = Sequence { args: self, frames: frames.clone(), pattern, options, tree: None };
@@ -104,7 +103,10 @@ impl RenderArgs {
             for frame in frames {
                 let report = sequence.frame(&renderer, &asset, frame, started)?;
                 started = Instant::now();
-                self.tell(&report, &mut told, &mut outcome)?;
+                match self.json {
+                    true => drop(context.tell(&Outcome::json(&report)?.stdout)?),
+                    false => self.tell(&report, &mut told, &mut outcome),
+                }
             }
             Ok(outcome)
         })
@@ -115,10 +117,8 @@ impl RenderArgs {
     }
 
     /// Adds a frame's report to what will be printed.
-    fn tell(&self, report: &Report, told: &mut Vec<String>, outcome: &mut Outcome) -> Result<()> {
-        if self.json {
-            outcome.stdout.extend(Outcome::json(report)?.stdout);
-        } else if !self.quiet {
+    fn tell(&self, report: &Report, told: &mut Vec<String>, outcome: &mut Outcome) {
+        if !self.quiet {
             outcome.stdout.extend(format!("{}\n", report.image.path).into_bytes());
             let frame = report.frame.unwrap_or_default();
             let tree = match report.bvh.update {
@@ -137,7 +137,6 @@ impl RenderArgs {
                 }
             }
         }
-        Ok(())
     }
 }
 

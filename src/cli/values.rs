@@ -4,6 +4,7 @@ use clap::ValueEnum;
 use glam::DVec3;
 use glimt::bvh::Quality;
 use glimt::scene::{Filter, Instancing, Sampler};
+use std::time::Duration;
 
 /// How much work goes into the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -123,6 +124,13 @@ pub fn bytes(text: &str) -> Result<u64, String> {
     count.filter(|count| *count > 0).ok_or_else(|| format!("'{text}' is no size such as 500M"))
 }
 
+/// A time in seconds above 0.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.trim().parse().ok().filter(|seconds| *seconds > 0.0);
+    let seconds = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    seconds.ok_or_else(|| format!("'{text}' is no number of seconds above 0"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,6 +140,14 @@ mod tests {
         assert_eq!(size("640x480"), Ok((640, 480)));
         assert_eq!(size("1X2"), Ok((1, 2)));
         assert!(size("640").is_err() && size("x").is_err() && size("-1x2").is_err() && size("1.5x2").is_err());
+    }
+
+    #[test]
+    fn times() {
+        assert_eq!(seconds("1.5"), Ok(Duration::from_millis(1500)));
+        for wrong in ["0", "-1", "inf", "NaN", "1e300", "soon", ""] {
+            assert!(seconds(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

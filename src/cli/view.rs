@@ -63,6 +63,9 @@ pub struct ViewArgs {
     /// Whether instances share the triangles of their mesh in memory
     #[arg(long, value_enum, default_value_t = InstancingChoice::Auto)]
     instances: InstancingChoice,
+    /// Refuse a scene of more triangles, all instances counted
+    #[arg(long, value_name = "N")]
+    max_triangles: Option<u64>,
     /// Compile and run everything, needed or not
     #[arg(long, hide = true)]
     all_features: bool,
@@ -104,6 +107,7 @@ impl ViewArgs {
             samples_in_flight: self.samples_in_flight,
             bvh: self.bvh.map(Into::into),
             instancing: self.instances.into(),
+            max_triangles: self.max_triangles,
             all_features: self.all_features,
             ..Options::default()
         })
@@ -147,7 +151,8 @@ mod tests {
     fn each_flag_sets_its_option() {
         let own = options(
             "--size 3x4 --spp 5 --max-depth 6 --background black --eye -1,2,3 --target 0,0,1 --up 0,0,1 --fov 90 \
-             --no-default-light --samples-in-flight 128 --all-features --scene 1 --sampler stratified --filter tent --seed 9",
+             --no-default-light --samples-in-flight 128 --all-features --scene 1 --sampler stratified --filter tent --seed 9 \
+             --max-triangles 7",
         );
         let own = own.unwrap();
         assert_eq!((own.size, own.samples, own.max_depth), ((3, 4), 5, 6));
@@ -156,6 +161,7 @@ mod tests {
         let eye = DVec3::new(-1.0, 2.0, 3.0);
         assert_eq!(own.camera, CameraChoice::LookAt { eye, target: Some(DVec3::Z) });
         assert_eq!((own.up, own.fov), (DVec3::Z, Some(std::f64::consts::FRAC_PI_2)));
+        assert_eq!(own.max_triangles, Some(7));
         assert!(!own.default_light && own.all_features && own.samples_in_flight == 128);
         let orbit = CameraChoice::Orbit { theta: -30.0, phi: 60.0, radius: 2.5, target: None };
         assert_eq!(options("--orbit -30,60,2.5").unwrap().camera, orbit);

@@ -38,12 +38,16 @@ pub fn render(scene: &Scene, options: &Options) -> Result<(Film, Report)> {
     Renderer::new(&options.device, options.validate)?.render(scene, options)
 }
 
+/// Most kernels that are kept: those of some forty sets of features.
+const MOST_KERNELS: usize = 256;
+
 /// An open device with its kernels, for any number of scenes.
 pub struct Renderer {
     device: Arc<Device>,
     layout: Arc<Layout>,
     cache: Cache,
-    /// Compiled kernels by name and features: a second pipeline of the same code would be compiled again.
+    /// Compiled kernels by name and features: a second pipeline of the same code would be compiled again. Scenes of all kinds have
+    /// some dozen sets of features; [`MOST_KERNELS`] bounds what a long life may gather.
     kernels: Mutex<HashMap<(&'static str, Features), Arc<Kernel>>>,
     /// One frame at a time: a frame takes the whole device anyway, and the validation layers of 1.3.239 crash when one
     /// thread frees its commands while another waits for the queue.
@@ -65,8 +69,9 @@ impl Prepared {
     /// Makes the soup, resolves the camera, finds the features.
     ///
     /// # Errors
-    /// As [`Options::view`] and [`Soup::of`].
+    /// As [`Options::check_triangles`], [`Options::view`] and [`Soup::of`].
     pub fn new(scene: &Scene, options: &Options) -> Result<Self> {
+        options.check_triangles(scene)?;
         let mut soup = Soup::with(scene, options.instancing)?;
         let view = options.view(scene, &soup)?;
         let sabotage = |one| options.sabotage == Some(one);
@@ -167,6 +172,10 @@ impl Renderer {
         if let Some(kernel) = kernels.get(&(code.name, features)) {
             return Ok(kernel.clone());
         }
+        if kernels.len() >= MOST_KERNELS {
+            // Frames hold on to those they use.
+            kernels.clear();
+        }
         let spirv = match self.device.fetch {
             Fetch::Texel => code.texel_fetch,
             Fetch::Storage => code.storage_fetch,
@@ -226,6 +235,7 @@ impl Renderer {
         let most = self.device.info.max_storage_bytes / size_of::<RayItem>() as u64;
         let in_flight = options.samples_in_flight.min(u32::try_from(most).unwrap_or(u32::MAX));
         progressive::check(options)?;
+        self.device.forget_peak_memory();
         let start = Instant::now();
         let textures = textures::Textures::of(scene, features.textures)?;
         let plan = Plan::with_textures(prepared, scene, features, tree.size(), in_flight, &textures);

@@ -1,7 +1,7 @@
 //! What a caller may choose.
 
 use crate::bvh::Quality;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scene::{Background, CameraChoice, Filter, Instancing, Sampler, Scene, Soup, View};
 use crate::vulkan::DeviceChoice;
 use glam::DVec3;
@@ -66,6 +66,8 @@ pub struct Options {
     pub bvh: Option<Quality>,
     /// Whether instances share the triangles of their mesh.
     pub instancing: Instancing,
+    /// Scenes of more triangles, all instances counted, are refused. Default: none are.
+    pub max_triangles: Option<u64>,
     /// Every feature on, needed or not: slower, the same picture. For tests.
     pub all_features: bool,
     /// A safeguard switched off, to see what it prevents. For tests.
@@ -97,6 +99,7 @@ impl Default for Options {
             samples_in_flight: 1 << 17,
             bvh: None,
             instancing: Instancing::Auto,
+            max_triangles: None,
             all_features: false,
             sabotage: None,
             progress: None,
@@ -114,6 +117,20 @@ impl Options {
             2..8 => Quality::Balanced,
             _ => Quality::Best,
         })
+    }
+
+    /// Refuses a scene of too many triangles, before anything is made of them.
+    ///
+    /// # Errors
+    /// `Content` with their number and the limit.
+    pub fn check_triangles(&self, scene: &Scene) -> Result<()> {
+        let count = scene.triangle_count();
+        match self.max_triangles {
+            Some(most) if count as u64 > most => {
+                Err(Error::content(&scene.name, format!("{count} triangles: the limit is {most} (--max-triangles)")))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The view of `scene`, whose triangles are `soup`, that these options mean.

@@ -203,6 +203,12 @@ impl Device {
         Ok(device)
     }
 
+    /// From now on the peak is that of what follows.
+    pub fn forget_peak_memory(&self) {
+        let mut count = lock(&self.memory);
+        count.peak = count.now;
+    }
+
     /// Most bytes of device memory that buffers have held at once.
     pub fn peak_memory(&self) -> u64 {
         lock(&self.memory).peak
