@@ -14,6 +14,7 @@
 //! * `study` — slopes, knobs, estimated against true error
 //! * `cli` — the program: exit codes, messages, files
 //! * `batch` — JSON jobs in, answers and pictures out, in one process: order, faults, limits, line by line
+//! * `test_models` — models that show whether they are drawn right, against what they looked like
 //! * `corpus` — real and broken files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
@@ -33,4 +34,5 @@ mod scene;
 mod stress;
 mod study;
 mod support;
+mod test_models;
 mod textures;

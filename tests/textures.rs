@@ -109,7 +109,7 @@ fn what_is_far_away_is_the_mean_and_not_noise() {
     // A chessboard to the horizon, finer than pixels: far away it is half the light, near by it is black and white.
     let mut scene = alone(card(0.0, 4000.0), unlit(Some(Map::of(0))));
     scene.instances[0].world_from_object = DMat4::from_rotation_x(-PI / 2.0) * DMat4::from_scale(DVec3::splat(500.0));
-    let checker = |x: u32, y: u32| if (x + y) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] };
+    let checker = |x: u32, y: u32| if (x + y).is_multiple_of(2) { [255; 4] } else { [0, 0, 0, 255] };
     scene.images = vec![image(2, 2, checker)];
     scene.textures = vec![Texture { magnify_linear: false, ..Texture::of(0) }];
     let camera = look(DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.0, 0.9, -1.0));
@@ -265,7 +265,7 @@ fn shaded_by(material: Material) -> Scene {
         ],
         vec![Light::directional(DVec3::NEG_Y, DVec3::splat(PI))],
     );
-    let holes = |x: u32, y: u32| if (x + y) % 2 == 0 { [255, 60, 60, 255] } else { [255, 255, 255, 40] };
+    let holes = |x: u32, y: u32| if (x + y).is_multiple_of(2) { [255, 60, 60, 255] } else { [255, 255, 255, 40] };
     (scene.images, scene.textures) = (vec![image(4, 4, holes)], vec![Texture::of(0)]);
     scene
 }

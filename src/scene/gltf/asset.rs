@@ -82,6 +82,7 @@ impl Document<'_> {
         self.check_sizes(&hierarchy, &base, &primitives, &shapes)?;
         let visible = visible_materials(&hierarchy, &base, &primitives);
         self.add_images(&mut base, &visible, options)?;
+        self.convert_spec_gloss(&mut base);
         let skins = self.used_skins(&hierarchy, &primitives, &shapes)?;
         let tracks = animation.map_or(Vec::new(), |animation| self.tracks(animation));
         let (lights, projections) = (self.read_lights(), self.projections());

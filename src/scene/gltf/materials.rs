@@ -72,10 +72,10 @@ fn whitted(material: &Value) -> Result<Option<Whitted>, String> {
 
 /// Properties of an object, with what glTF takes for those that are not there.
 #[derive(Clone, Copy)]
-struct Properties<'a>(&'a Value);
+pub(super) struct Properties<'a>(pub &'a Value);
 
 impl<'a> Properties<'a> {
-    fn extension(self, name: &str) -> Option<Properties<'a>> {
+    pub fn extension(self, name: &str) -> Option<Properties<'a>> {
         self.0.get("extensions")?.get(name).filter(|value| value.is_object()).map(Properties)
     }
 
@@ -89,11 +89,11 @@ impl<'a> Properties<'a> {
     }
 
     /// A number from 0 to 1.
-    fn share(self, name: &str, default: f64) -> f64 {
+    pub fn share(self, name: &str, default: f64) -> f64 {
         self.number(name, default).min(1.0)
     }
 
-    fn color(self, name: &str, default: f64) -> DVec3 {
+    pub fn color(self, name: &str, default: f64) -> DVec3 {
         let channel = |index: usize| self.0.get(name).and_then(|value| value.get(index)?.as_f64()).unwrap_or(default);
         DVec3::new(channel(0), channel(1), channel(2)).max(DVec3::ZERO)
     }
@@ -104,7 +104,9 @@ impl Document<'_> {
     pub fn add_materials(&mut self, scene: &mut Scene) {
         let materials = self.raw("materials");
         for (index, material) in materials.iter().enumerate() {
-            let material = self.material(&format!("materials[{index}]"), Properties(material));
+            let (path, own) = (format!("materials[{index}]"), Properties(material));
+            let mut material = self.material(&path, own);
+            self.read_spec_gloss(&path, own, index, &mut material);
             scene.materials.push(material);
         }
         scene.materials.push(Material::default());
@@ -218,7 +220,7 @@ impl Document<'_> {
     }
 
     /// A texture on a surface.
-    fn map(&mut self, path: &str, of: Properties, name: &str) -> Option<Map> {
+    pub(super) fn map(&mut self, path: &str, of: Properties, name: &str) -> Option<Map> {
         let info = of.0.get(name).filter(|info| info.is_object())?;
         let texture = info.get("index").and_then(Value::as_u64).map(|index| index as usize)?;
         if texture >= self.root_textures() {

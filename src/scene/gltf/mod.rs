@@ -26,6 +26,7 @@ mod morph;
 mod nodes;
 mod pose;
 mod skin;
+mod spec_gloss;
 mod textures;
 
 pub use asset::Asset;
@@ -121,6 +122,8 @@ struct Document<'a> {
     spent: Cell<u64>,
     /// How many these may be.
     most_numbers: u64,
+    /// Materials that wait for their pictures to become metallic-roughness ones.
+    unconverted: Vec<spec_gloss::Unconverted>,
     /// Materials, textures and the like as they are in the file.
     raw: Value,
 }
@@ -155,6 +158,7 @@ impl<'a> Document<'a> {
             warnings,
             spent: Cell::new(0),
             most_numbers: accessor::MOST_NUMBERS,
+            unconverted: Vec::new(),
             raw: Value::Object(raw),
         })
     }
