@@ -10,7 +10,7 @@ const PROBES: f64 = 8.0;
 /// All pictures that a scene's maps show.
 pub(super) struct Library<'a> {
     scene: &'a Scene,
-    mipmaps: BTreeMap<(usize, bool), Mipmaps>,
+    mipmaps: BTreeMap<(usize, bool), Mipmaps<'a>>,
 }
 
 /// Where a map is read: texture coordinates of each set, and how they change along the axes of a footprint.
@@ -63,7 +63,7 @@ impl<'a> Library<'a> {
 
 struct Reader<'a> {
     texture: &'a Texture,
-    mipmaps: &'a Mipmaps,
+    mipmaps: &'a Mipmaps<'a>,
     is_srgb: bool,
 }
 

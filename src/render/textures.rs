@@ -92,7 +92,7 @@ impl Textures {
         let mut firsts = Vec::new();
         for (_, _, pixels) in mipmaps.levels.iter().take(MOST_LEVELS) {
             firsts.push(self.pixels.len() as u32);
-            match pixels {
+            match pixels.as_ref() {
                 Pixels::Rgba8(pixels) => self.pixels.extend(pixels.chunks(4).map(|four| {
                     let mut texel = [0; 4];
                     texel.iter_mut().zip(four).for_each(|(word, pixel)| *word = u32::from_le_bytes(*pixel));
@@ -109,7 +109,7 @@ impl Textures {
             }
         }
         let (width, height, pixels) = &mipmaps.levels[0];
-        (firsts, (*width, *height), matches!(pixels, Pixels::Rgba16(_)))
+        (firsts, (*width, *height), matches!(pixels.as_ref(), Pixels::Rgba16(_)))
     }
 }
 

@@ -2,28 +2,31 @@
 
 use super::{Image, Pixels};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// A picture in levels, each half as wide and high as the one before, rounded down, but at least 1.
 #[derive(Clone, Debug)]
-pub struct Mipmaps {
+pub struct Mipmaps<'a> {
     /// Width, height and pixels of each level.
-    pub levels: Vec<(u32, u32, Pixels)>,
+    pub levels: Vec<(u32, u32, Cow<'a, Pixels>)>,
 }
 
-impl Mipmaps {
+impl<'a> Mipmaps<'a> {
     /// The levels of a picture: the mean of the pixels that each covers, by area. Colours in sRGB are averaged as the light that they stand for.
-    pub fn of(image: &Image, is_srgb: bool) -> Self {
-        let mut levels = vec![(image.width, image.height, image.pixels.clone())];
+    pub fn of(image: &'a Image, is_srgb: bool) -> Self {
+        let light: Vec<f32> = (0..=255_u8).map(|value| decode(f32::from(value) / 255.0, is_srgb)).collect();
+        let codes = codes(is_srgb);
+        let mut levels = Self::whole(image).levels;
         while let Some((width, height, pixels)) = levels.last().filter(|(width, height, _)| *width > 1 || *height > 1) {
             let size = (*width, *height);
-            let smaller = match pixels {
+            let smaller = match pixels.as_ref() {
                 Pixels::Rgba8(pixels) => {
-                    let light: Vec<f32> = (0..=255_u8).map(|value| decode(f32::from(value) / 255.0, is_srgb)).collect();
                     let decoded = |[r, g, b, a]: [u8; 4]| {
                         [light[r as usize], light[g as usize], light[b as usize], f32::from(a) / 255.0]
                     };
-                    Pixels::Rgba8(halved(size, pixels, decoded, |mean| {
-                        encoded(mean, is_srgb).map(|value| (255.0 * value).round() as u8)
+                    Pixels::Rgba8(halved(size, pixels, decoded, |[r, g, b, a]| {
+                        let code = |light: f32| codes[(light * LIGHTS).round().min(LIGHTS) as usize];
+                        [code(r), code(g), code(b), (255.0 * a).round() as u8]
                     }))
                 }
                 Pixels::Rgba16(pixels) => {
@@ -36,14 +39,14 @@ impl Mipmaps {
                     }))
                 }
             };
-            levels.push(((width / 2).max(1), (height / 2).max(1), smaller));
+            levels.push(((width / 2).max(1), (height / 2).max(1), Cow::Owned(smaller)));
         }
         Self { levels }
     }
 
     /// The picture alone.
-    pub fn whole(image: &Image) -> Self {
-        Self { levels: vec![(image.width, image.height, image.pixels.clone())] }
+    pub fn whole(image: &'a Image) -> Self {
+        Self { levels: vec![(image.width, image.height, Cow::Borrowed(&image.pixels))] }
     }
 }
 
@@ -85,6 +88,15 @@ fn halved<T: Copy + Send + Sync>(
     (0..down).into_par_iter().flat_map_iter(row).collect()
 }
 
+/// Steps of light that have a code in a table: so many that the steepest part of sRGB needs twenty for one.
+const LIGHTS: f32 = 65535.0;
+
+/// The 8 bit codes of all steps of light: a power for every pixel takes ten times as long.
+fn codes(is_srgb: bool) -> Vec<u8> {
+    let code = |step: u16| encoded([f32::from(step) / LIGHTS, 0.0, 0.0, 0.0], is_srgb)[0];
+    (0..=u16::MAX).map(|step| (255.0 * code(step)).round() as u8).collect()
+}
+
 /// Light of a colour channel, both 0 to 1 (IEC 61966-2-1).
 fn decode(value: f32, is_srgb: bool) -> f32 {
     match is_srgb {
@@ -115,18 +127,20 @@ mod tests {
 
     #[test]
     fn levels_halve_down_to_one_pixel() {
-        let mipmaps = Mipmaps::of(&image(5, 2, vec![[9, 9, 9, 255]; 10]), true);
+        let grey = image(5, 2, vec![[9, 9, 9, 255]; 10]);
+        let mipmaps = Mipmaps::of(&grey, true);
         let sizes: Vec<(u32, u32)> = mipmaps.levels.iter().map(|(width, height, _)| (*width, *height)).collect();
         assert_eq!(sizes, [(5, 2), (2, 1), (1, 1)]);
         assert!(mipmaps.levels.iter().all(|(_, _, pixels)| {
-            matches!(pixels, Pixels::Rgba8(pixels) if pixels.iter().all(|pixel| *pixel == [9, 9, 9, 255]))
+            matches!(pixels.as_ref(), Pixels::Rgba8(pixels) if pixels.iter().all(|pixel| *pixel == [9, 9, 9, 255]))
         }));
     }
 
     #[test]
     fn black_and_white_are_half_the_light() {
         let checker = vec![[0, 0, 0, 0], [255, 255, 255, 255], [255, 255, 255, 255], [0, 0, 0, 0]];
-        let mean = |is_srgb| match &Mipmaps::of(&image(2, 2, checker.clone()), is_srgb).levels[1].2 {
+        let checker = image(2, 2, checker);
+        let mean = |is_srgb| match Mipmaps::of(&checker, is_srgb).levels[1].2.as_ref() {
             Pixels::Rgba8(pixels) => pixels[0],
             Pixels::Rgba16(_) => unreachable!(),
         };
@@ -137,7 +151,9 @@ mod tests {
     #[test]
     fn odd_sides_are_weighed_by_area() {
         let row = vec![[0, 0, 0, 0], [30, 0, 0, 0], [60, 0, 0, 0]];
-        let Pixels::Rgba8(last) = &Mipmaps::of(&image(3, 1, row), false).levels[1].2 else { unreachable!() };
+        let row = image(3, 1, row);
+        let mipmaps = Mipmaps::of(&row, false);
+        let Pixels::Rgba8(last) = mipmaps.levels[1].2.as_ref() else { unreachable!() };
         assert_eq!(last[0][0], 30);
         assert_eq!(covered(0, 5, 2), (0, [0.4, 0.4, 0.2]));
     }
