@@ -12,11 +12,13 @@
 //! * `stress` — extreme cases hold, and fail without their safeguards
 //! * `study` — slopes, knobs, estimated against true error
 //! * `cli` — the program: exit codes, messages, files
-//! * `corpus` — real and broken files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
+//! * `broken` — the validator's broken files, what the fuzzer found, random changes: an error or a scene, never a panic
+//! * `corpus` — real files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
 
 mod architecture;
+mod broken;
 mod bvh;
 mod cli;
 mod corpus;
