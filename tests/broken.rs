@@ -34,8 +34,10 @@ fn codes(verdict: &Value) -> Vec<&str> {
 fn the_validators_verdicts_are_ours() {
     let Some(corpus) = corpus() else { return };
     let (mut counts, mut faults) = (BTreeMap::<&str, usize>::new(), Vec::new());
-    let reports: Vec<PathBuf> =
-        files(&corpus.join("invalid")).into_iter().filter(|path| path.to_string_lossy().ends_with(".report.json")).collect();
+    let reports: Vec<PathBuf> = files(&corpus.join("invalid"))
+        .into_iter()
+        .filter(|path| path.to_string_lossy().ends_with(".report.json"))
+        .collect();
     for report in &reports {
         let path = PathBuf::from(report.to_string_lossy().strip_suffix(".report.json").unwrap());
         let verdict: Value = serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap();
@@ -50,7 +52,9 @@ fn the_validators_verdicts_are_ours() {
             (true, Ok(_)) if !said.is_empty() => "an error, warned of",
             (true, Ok(_)) => "an error, not mentioned",
             (false, Ok(_)) => "no error, accepted",
-            (false, Err(_)) if said[0].contains("it requires") || said[0].contains("minVersion") => "no error, needs what we lack",
+            (false, Err(_)) if said[0].contains("it requires") || said[0].contains("minVersion") => {
+                "no error, needs what we lack"
+            }
             (false, Err(_)) if said[0].contains("there is no BIN chunk for it") => "no error, its data are missing",
             (false, Err(_)) => "no error, refused",
         };

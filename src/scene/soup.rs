@@ -140,6 +140,11 @@ impl Soup {
             let count = scene.materials.len();
             return Err(Error::content(&scene.name, format!("{count} materials: at most {MAX_MATERIALS}")));
         }
+        let bytes = (count * attributes.host_bytes()) as u64;
+        if let Some(most) = scene.max_memory.filter(|most| bytes > *most) {
+            let message = format!("{count} triangles take {bytes} bytes, more than {most} (see --max-memory)");
+            return Err(Error::content(&scene.name, message));
+        }
         let mut soup = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, ..Self::default() };
         soup.positions.reserve(count);
         let mut not_finite = 0;
@@ -320,6 +325,18 @@ struct Attributes {
 }
 
 impl Attributes {
+    /// Bytes that a triangle takes in the soup.
+    fn host_bytes(&self) -> usize {
+        let corners = [
+            (self.smooth, size_of::<[Vec3; 3]>()),
+            (self.colored, size_of::<[Vec4; 3]>()),
+            (self.textured, size_of::<[[Vec2; 2]; 3]>()),
+            (self.tangents, size_of::<[Vec4; 3]>()),
+        ];
+        let attributes: usize = corners.into_iter().filter(|(has, _)| *has).map(|(_, bytes)| bytes).sum();
+        size_of::<[DVec3; 3]>() + size_of::<u32>() + size_of::<TriangleFlags>() + attributes
+    }
+
     /// How many there are.
     fn count(&self) -> usize {
         [self.smooth, self.colored, self.textured, self.tangents].into_iter().filter(|has| *has).count()

@@ -11,6 +11,9 @@ use ::gltf::json::validation::Checked;
 use glam::{Vec2, Vec3, Vec4};
 use std::collections::BTreeSet;
 
+/// Numbers that the tangents of a triangle take.
+const TANGENT_NUMBERS: u64 = 12;
+
 impl Document<'_> {
     /// Adds every primitive that can be drawn, with the materials of a variant; answers, for each glTF mesh, the indices of
     /// what it became, and for each of these what can change its shape.
@@ -82,6 +85,9 @@ impl Document<'_> {
         if let Some(beyond) = corners.iter().find(|corner| **corner as usize >= count) {
             return Err(self.refuse(format!("{place}: index {beyond} lies beyond its {count} vertices")));
         }
+        // Of strips and fans nearly every corner becomes a triangle; a normal map adds tangents.
+        let most = if mode == Mode::Triangles { corners.len() / 3 } else { corners.len() } as u64;
+        self.spend_numbers(most * if maps.normal.is_some() { 3 + TANGENT_NUMBERS } else { 3 })?;
         let triangles = triangles(mode, &corners);
         if triangles.is_empty() || (mode == Mode::Triangles && corners.len() % 3 != 0) {
             self.warnings.add(format!("ignored: {place} has {} corners, not whole triangles", corners.len()));

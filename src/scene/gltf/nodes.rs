@@ -9,6 +9,9 @@ use ::gltf::json::{self};
 use glam::{DMat4, DQuat, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
+/// Numbers of four bytes that the transform of an instance takes.
+const PLACE_NUMBERS: u64 = 32;
+
 /// A node's own transform.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Local {
@@ -216,6 +219,8 @@ impl Document<'_> {
         let vector = |values: &Option<Vec<f32>>, i: usize, default: DVec3| {
             values.as_ref().map_or(default, |values| glam::Vec3::from_slice(&values[3 * i..]).as_dvec3())
         };
+        // What is made of them takes more than they do.
+        self.spend_numbers(count.unwrap_or(0) as u64 * PLACE_NUMBERS)?;
         let transform = |i: usize| {
             let rotation = rotations
                 .as_ref()

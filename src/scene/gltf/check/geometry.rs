@@ -26,6 +26,9 @@ pub(super) fn buffers(root: &Value, has_binary: bool, warnings: &mut Warnings) {
         if stride > number(view, "byteLength") {
             warnings.add(format!("bufferViews[{index}].byteStride is greater than its byteLength"));
         }
+        if number(view, "byteLength") == Some(0.0) {
+            warnings.add(format!("bufferViews[{index}].byteLength is 0"));
+        }
         let buffer =
             view.get("buffer").and_then(Value::as_u64).and_then(|buffer| list(root, "buffers").get(buffer as usize));
         let end = number(view, "byteOffset").unwrap_or(0.0) + number(view, "byteLength").unwrap_or(0.0);
@@ -167,6 +170,13 @@ pub(super) fn meshes(root: &Value, warnings: &mut Warnings) -> Result<(), String
             }
         }
         morph_targets(&path, primitive, attributes, &accessor, warnings);
+        for (index, target) in list(primitive, "targets").iter().enumerate() {
+            for (name, value) in target.as_object().into_iter().flatten() {
+                if is_for_indices(root, accessor(value)) {
+                    warnings.add(format!("{path}.targets[{index}].{name}: its bufferView is meant for indices"));
+                }
+            }
+        }
     }
     mesh_weights(root, warnings);
     Ok(())
@@ -209,7 +219,7 @@ fn attribute_format(
     }
     let view_index = accessor.get("bufferView").and_then(Value::as_u64);
     let view = view_index.and_then(|view| list(root, "bufferViews").get(view as usize));
-    if view.and_then(|view| view.get("target")?.as_u64()) == Some(34963) {
+    if is_for_indices(root, Some(accessor)) {
         warnings.add(format!("{path}.attributes.{name}: its bufferView is meant for indices"));
     }
     let Some((component, components)) = sizes(accessor) else { return };
@@ -223,6 +233,13 @@ fn attribute_format(
         warnings
             .add(format!("{path}.attributes.{name}: its bufferView serves several accessors and has no byteStride"));
     }
+}
+
+/// The buffer view of an accessor is declared to hold indices.
+fn is_for_indices(root: &Value, accessor: Option<&Value>) -> bool {
+    let view = accessor.and_then(|accessor| accessor.get("bufferView")?.as_u64());
+    let view = view.and_then(|view| list(root, "bufferViews").get(view as usize));
+    view.and_then(|view| view.get("target")?.as_u64()) == Some(34963)
 }
 
 fn morph_targets<'a>(
