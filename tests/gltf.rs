@@ -380,7 +380,7 @@ fn unlit_is_the_base_color_alone() {
 }
 
 /// A view of three positions, compressed by meshopt.
-const MESHOPT: &str = "oerqqgB/fwAAfwAAAAAAAAAAAAAAAAAAAAAAAAAAABIBAA==";
+pub const MESHOPT: &str = "oerqqgB/fwAAfwAAAAAAAAAAAAAAAAAAAAAAAAAAABIBAA==";
 
 #[test]
 fn compressed_views_replace_the_fallback() {

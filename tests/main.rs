@@ -8,6 +8,7 @@
 //! * `poses` — animations, skins, morph targets against values computed by hand; variants, visibility, sequences
 //! * `frames` — pictures: against the reference, closed forms, determinism, features
 //! * `hard_scenes` — pictures that are hard on trees, stacks and f32
+//! * `hostile` — documents that ask for too much, documents changed at random
 //! * `measuring` — bench, stress and study as programs
 //! * `stress` — extreme cases hold, and fail without their safeguards
 //! * `study` — slopes, knobs, estimated against true error
@@ -25,6 +26,7 @@ mod corpus;
 mod frames;
 mod gltf;
 mod hard_scenes;
+mod hostile;
 mod layout;
 mod measuring;
 mod poses;

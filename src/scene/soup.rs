@@ -84,6 +84,10 @@ const MAX_MATERIALS: usize = 1 << MATERIAL_BITS;
 /// Sizes of scenes. The device gets them scaled; this is what the scene's own f32 positions and intensities can mean.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
+/// Most points times places that are gone through for the box around a shared mesh; beyond them its own box is placed, which may be
+/// larger than what is in it.
+const MOST_PLACED_POINTS: usize = 1 << 31;
+
 /// Bytes that a triangle takes on the device: corners and its share of the tree; one of its attributes.
 const TRIANGLE_BYTES: usize = 48 + 16;
 const ATTRIBUTE_BYTES: usize = 48;
@@ -197,6 +201,10 @@ impl Soup {
         let mut points: Vec<DVec3> = self.positions[first..].iter().flatten().copied().collect();
         points.sort_by(|a, b| a.to_array().map(f64::to_bits).cmp(&b.to_array().map(f64::to_bits)));
         points.dedup();
+        let places = scene.instances.iter().filter(|instance| instance.mesh == mesh).count();
+        if points.len().saturating_mul(places) > MOST_PLACED_POINTS {
+            points = box_corners(&points);
+        }
         for instance in scene.instances.iter().filter(|instance| instance.mesh == mesh) {
             if is_flat(&instance.world_from_object) {
                 *flattened += 1;
@@ -341,6 +349,15 @@ impl Attributes {
     fn count(&self) -> usize {
         [self.smooth, self.colored, self.textured, self.tangents].into_iter().filter(|has| *has).count()
     }
+}
+
+/// The corners of the box around points.
+fn box_corners(points: &[DVec3]) -> Vec<DVec3> {
+    let lo = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let hi = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let corner =
+        |i: usize| DVec3::from_array(std::array::from_fn(|axis| if i >> axis & 1 == 0 { lo[axis] } else { hi[axis] }));
+    (0..8).map(corner).collect()
 }
 
 /// The transform has no volume.

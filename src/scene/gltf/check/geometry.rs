@@ -2,7 +2,7 @@
 
 use super::{list, number, selected, Warnings};
 use serde_json::{Map, Value};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) fn buffers(root: &Value, has_binary: bool, warnings: &mut Warnings) {
     if has_binary && list(root, "buffers").first().is_none_or(|first| first.get("uri").is_some()) {
@@ -178,6 +178,7 @@ pub(super) fn meshes(root: &Value, warnings: &mut Warnings) -> Result<(), String
             }
         }
     }
+    mixed_views(root, warnings);
     mesh_weights(root, warnings);
     Ok(())
 }
@@ -224,9 +225,8 @@ fn attribute_format(
     }
     let Some((component, components)) = sizes(accessor) else { return };
     let stride = view.and_then(|view| number(view, "byteStride"));
-    if stride.unwrap_or((component * components) as f64) % 4.0 != 0.0
-        || number(accessor, "byteOffset").unwrap_or(0.0) % 4.0 != 0.0
-    {
+    let offset = number(accessor, "byteOffset").unwrap_or(0.0);
+    if view.is_some() && (stride.unwrap_or((component * components) as f64) % 4.0 != 0.0 || offset % 4.0 != 0.0) {
         warnings.add(format!("{path}.attributes.{name}: vertices are not aligned to 4 bytes"));
     }
     if stride.is_none() && view_index.is_some_and(|view| users.get(&view) > Some(&1)) {
@@ -267,6 +267,19 @@ fn morph_targets<'a>(
                 warnings.add(format!("{path}.targets[{index}].POSITION: its accessor has no min and max"));
             }
         }
+    }
+}
+
+/// A buffer view holds indices or vertices.
+fn mixed_views(root: &Value, warnings: &mut Warnings) {
+    let accessors = list(root, "accessors");
+    let views = |pattern: &str| -> BTreeSet<u64> {
+        let all = selected(root, pattern).into_iter();
+        all.filter_map(|(_, value)| accessors.get(value.as_u64()? as usize)?.get("bufferView")?.as_u64()).collect()
+    };
+    let (indices, vertices) = (views("meshes.*.primitives.*.indices"), views("meshes.*.primitives.*.attributes.*"));
+    for view in indices.intersection(&vertices) {
+        warnings.add(format!("bufferViews[{view}] holds both indices and vertices"));
     }
 }
 

@@ -118,6 +118,6 @@ mod tests {
     #[test]
     fn wide_pixels_count_twice() {
         let header = Header { media_type: "image/png", width: 9, height: 4, is_wide: true };
-        assert_eq!((header.numbers(), header.limited(4).numbers()), (72, 8));
+        assert_eq!((header.numbers(), header.limited(4).numbers()), (72, 16));
     }
 }
