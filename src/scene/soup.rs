@@ -168,8 +168,12 @@ impl Soup {
             soup.placements.push(Placement { part: 0, world_from_part: DMat4::IDENTITY });
             soup.placed = own;
         }
+        let mut places = vec![Vec::new(); scene.meshes.len()];
+        for instance in scene.instances.iter().filter(|instance| shared[instance.mesh]) {
+            places[instance.mesh].push(instance.world_from_object);
+        }
         for mesh in (0..scene.meshes.len()).filter(|mesh| shared[*mesh]) {
-            not_finite += soup.add_shared(scene, mesh, attributes, &mut flattened[mesh]);
+            not_finite += soup.add_shared(scene, mesh, attributes, &places[mesh], &mut flattened[mesh]);
         }
         for (mesh, count) in scene.meshes.iter().zip(flattened).filter(|(_, count)| *count > 0) {
             let name = &mesh.name;
@@ -191,8 +195,15 @@ impl Soup {
         Ok(soup)
     }
 
-    /// Adds a mesh once and all its instances as placements; returns how many triangles are not finite.
-    fn add_shared(&mut self, scene: &Scene, mesh: usize, attributes: Attributes, flattened: &mut usize) -> usize {
+    /// Adds a mesh once and the places where it stands as placements; returns how many triangles are not finite.
+    fn add_shared(
+        &mut self,
+        scene: &Scene,
+        mesh: usize,
+        attributes: Attributes,
+        places: &[DMat4],
+        flattened: &mut usize,
+    ) -> usize {
         let first = self.positions.len();
         let once = Instance { mesh, world_from_object: DMat4::IDENTITY };
         let not_finite = self.add(scene, &once, attributes).not_finite;
@@ -201,16 +212,14 @@ impl Soup {
         let mut points: Vec<DVec3> = self.positions[first..].iter().flatten().copied().collect();
         points.sort_by(|a, b| a.to_array().map(f64::to_bits).cmp(&b.to_array().map(f64::to_bits)));
         points.dedup();
-        let places = scene.instances.iter().filter(|instance| instance.mesh == mesh).count();
-        if points.len().saturating_mul(places) > MOST_PLACED_POINTS {
+        if points.len().saturating_mul(places.len()) > MOST_PLACED_POINTS {
             points = box_corners(&points);
         }
-        for instance in scene.instances.iter().filter(|instance| instance.mesh == mesh) {
-            if is_flat(&instance.world_from_object) {
+        for world_from_part in places.iter().copied() {
+            if is_flat(&world_from_part) {
                 *flattened += 1;
                 continue;
             }
-            let world_from_part = instance.world_from_object;
             for point in &points {
                 let point = world_from_part.transform_point3(*point);
                 self.lo = self.lo.min(point);

@@ -216,6 +216,9 @@ impl Document<'_> {
         };
         let index_kind = index_kind.0;
         let (count, components) = (sparse.count.0, elements.components);
+        if count > self.root.accessors[index].count.0 {
+            return Err(refuse("it replaces more elements than there are"));
+        }
         let element = kind.size() * components;
         let places =
             self.layout(index, sparse.indices.buffer_view, sparse.indices.byte_offset.0, count, index_kind.size())?;

@@ -71,9 +71,10 @@ impl Document<'_> {
                 faults.extend(own.map(|fault| format!("accessors[{index}]: {fault}")));
             }
         }
+        let joints = self.fewest_joints();
         for (mesh, own) in self.root.meshes.iter().enumerate() {
             for (part, primitive) in own.primitives.iter().enumerate() {
-                let fault = self.influence_fault(primitive, self.fewest_joints(mesh), &mut left);
+                let fault = self.influence_fault(primitive, joints.get(&mesh).copied(), &mut left);
                 faults.extend(fault.map(|fault| format!("meshes[{mesh}].primitives[{part}]: {fault}")));
             }
         }
@@ -129,10 +130,14 @@ impl Document<'_> {
         None
     }
 
-    /// Joints of the smallest skin that some node has with a mesh.
-    fn fewest_joints(&self, mesh: usize) -> Option<usize> {
-        let nodes = self.root.nodes.iter().filter(|node| node.mesh.is_some_and(|own| own.value() == mesh));
-        nodes.filter_map(|node| Some(self.skins.get(node.skin?.value())?.joints.len())).min()
+    /// For each mesh that some node has with a skin the joints of the smallest such skin.
+    fn fewest_joints(&self) -> BTreeMap<usize, usize> {
+        let mut fewest = BTreeMap::new();
+        for (mesh, skin) in self.root.nodes.iter().filter_map(|node| node.mesh.zip(node.skin)) {
+            let joints = self.skins.get(skin.value()).map_or(0, |skin| skin.joints.len());
+            fewest.entry(mesh.value()).and_modify(|least: &mut usize| *least = joints.min(*least)).or_insert(joints);
+        }
+        fewest
     }
 
     /// What is wrong with the joints and weights of a primitive.

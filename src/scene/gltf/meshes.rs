@@ -3,7 +3,7 @@
 use super::accessor::Elements;
 use super::pose::Shape;
 use super::skin::Influences;
-use super::{draco, Document};
+use super::{draco, short, Document};
 use crate::error::Result;
 use crate::scene::{Maps, Mesh, Scene};
 use ::gltf::json::mesh::{Mode, Primitive};
@@ -33,7 +33,7 @@ impl Document<'_> {
                 let material = material.unwrap_or(default_material);
                 let maps = scene.materials[material].drawn_maps();
                 let Some(mut mesh) = self.primitive(&place, &primitive, &maps)? else { continue };
-                mesh.name = self.root.meshes[index].name.clone().unwrap_or(place.clone());
+                mesh.name = short(self.root.meshes[index].name.as_deref().unwrap_or(&place)).into_owned();
                 mesh.material = material;
                 shapes.push(self.shape(&place, &primitive, &mesh, skinned.contains(&index))?);
                 indices.push(scene.meshes.len());

@@ -37,6 +37,7 @@ use super::Scene;
 use crate::error::{Error, Result};
 use ::gltf::json::Root;
 use serde_json::Value;
+use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -211,6 +212,15 @@ fn typed(json: &[u8], mut value: Value) -> serde_json::Result<Root> {
 
 #[cfg(test)]
 mod tests;
+
+/// A name, cut off if it is very long: it may be repeated as often as something is in the file.
+fn short(name: &str) -> Cow<'_, str> {
+    const MOST: usize = 200;
+    match name.char_indices().nth(MOST) {
+        Some((end, _)) => Cow::Owned(format!("{}…", &name[..end])),
+        None => Cow::Borrowed(name),
+    }
+}
 
 /// Most texts of warnings: nobody reads more, and each element of a large file could have one of its own.
 const MOST_WARNINGS: usize = 1000;

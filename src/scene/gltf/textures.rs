@@ -54,14 +54,19 @@ impl Document<'_> {
         self.check_sources(list(&raw, "textures"), &headers);
         let cap = options.max_texture_size.unwrap_or(u32::MAX);
         let most = MOST_PIXELS.min(self.numbers_left());
-        let mut wanted = Vec::new();
-        for (index, header) in headers.into_iter().filter(|(index, _)| needed.contains(index)) {
+        let (mut wanted, mut encoded) = (Vec::new(), 0_u64);
+        for (index, (header, length)) in headers.into_iter().filter(|(index, _)| needed.contains(index)) {
             let (width, height, numbers) = (header.width, header.height, header.numbers());
             if numbers > most {
                 self.warnings.add(format!("ignored: images[{index}]: {width} × {height} is more than {most} pixels"));
                 continue;
             }
             self.spend_numbers(header.limited(cap).numbers())?;
+            // Many images may name the same long bytes for a few pixels each.
+            encoded = encoded.saturating_add(length);
+            if encoded > self.most_numbers.saturating_mul(4) {
+                return Err(self.refuse("its pictures take more bytes than they may (see --max-memory)"));
+            }
             wanted.push((index, numbers));
         }
         for batch in batches(wanted, most) {
@@ -82,19 +87,19 @@ impl Document<'_> {
 
     /// What the images claim to be. Warns of those that cannot be had, and of those whose media type is wrong if they are not
     /// needed: the others will be decoded.
-    fn headers(&mut self, count: usize, needed: &BTreeSet<usize>) -> BTreeMap<usize, Header> {
+    fn headers(&mut self, count: usize, needed: &BTreeSet<usize>) -> BTreeMap<usize, (Header, u64)> {
         let mut headers = BTreeMap::new();
         for index in 0..count {
             let is_needed = needed.contains(&index);
             match self.image_header(index) {
-                Ok(header) => {
+                Ok((header, length)) => {
                     let declared = self.image_media_type(index).filter(|_| !is_needed);
                     let wrong_type = declared.and_then(|declared| other_type(declared, header.media_type));
                     let no_size = header.numbers() == 0;
                     let no_size = no_size.then(|| format!("{} × {} is no size", header.width, header.height));
                     let faults = wrong_type.into_iter().chain(no_size.filter(|_| !is_needed));
                     faults.for_each(|fault| self.warnings.add(format!("images[{index}]: {fault}")));
-                    headers.insert(index, header);
+                    headers.insert(index, (header, length));
                 }
                 Err(fault) if is_needed => self.warnings.add(format!("ignored: {fault}")),
                 Err(fault) => self.warnings.add(fault),
@@ -104,11 +109,11 @@ impl Document<'_> {
     }
 
     /// Warns of textures whose pictures have a format that does not belong where they are named.
-    fn check_sources(&mut self, textures: &[Value], headers: &BTreeMap<usize, Header>) {
+    fn check_sources(&mut self, textures: &[Value], headers: &BTreeMap<usize, (Header, u64)>) {
         for (index, texture) in textures.iter().enumerate() {
             for (place, formats) in SOURCES {
                 let image = texture.pointer(place).and_then(Value::as_u64).map(|image| image as usize);
-                let Some((image, header)) = image.and_then(|image| Some((image, headers.get(&image)?))) else {
+                let Some((image, (header, _))) = image.and_then(|image| Some((image, headers.get(&image)?))) else {
                     continue;
                 };
                 if !formats.contains(&header.media_type) {

@@ -9,7 +9,7 @@ mod motion;
 mod nodes;
 mod surfaces;
 
-use super::{standing, Warnings};
+use super::{short, standing, Warnings};
 use crate::scene::Standing;
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
@@ -40,8 +40,8 @@ pub(super) fn required_extensions(root: &Value) -> Result<(), String> {
     if missing.is_empty() {
         return Ok(());
     }
-    let used = list(root, "extensionsUsed");
-    let undeclared = missing.iter().any(|name| !used.iter().any(|own| own == name));
+    let used: BTreeSet<&str> = list(root, "extensionsUsed").iter().filter_map(Value::as_str).collect();
+    let undeclared = missing.iter().any(|name| !used.contains(name));
     let undeclared = if undeclared { "; nor does extensionsUsed name it" } else { "" };
     Err(format!("it requires {}, which glimt does not support{undeclared}", missing.join(" and ")))
 }
@@ -77,7 +77,7 @@ fn select<'a>(root: &'a Value, pattern: &str, visit: &mut dyn FnMut(&str, &'a Va
                 items.iter().enumerate().for_each(|(i, item)| walk(item, &format!("{path}[{i}]"), rest, visit));
             }
             ("*", Value::Object(items)) => {
-                items.iter().for_each(|(key, item)| walk(item, &format!("{path}.{key}"), rest, visit));
+                items.iter().for_each(|(key, item)| walk(item, &format!("{path}.{}", short(key)), rest, visit));
             }
             (name, _) => {
                 let dot = if path.is_empty() { "" } else { "." };
@@ -300,7 +300,7 @@ fn walk_extensions<'a>(value: &'a Value, path: &str, visit: &mut dyn FnMut(&str,
                 }
                 if key != "extras" {
                     let dot = if path.is_empty() { "" } else { "." };
-                    walk_extensions(member, &format!("{path}{dot}{key}"), visit);
+                    walk_extensions(member, &format!("{path}{dot}{}", short(key)), visit);
                 }
             }
         }

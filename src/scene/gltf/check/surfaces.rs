@@ -2,6 +2,7 @@
 
 use super::{list, selected, Warnings};
 use serde_json::Value;
+use std::collections::BTreeSet;
 
 /// Factors of extensions that are out of range.
 pub(super) fn materials(root: &Value, warnings: &mut Warnings) {
@@ -75,13 +76,13 @@ fn textures(material: &Value) -> Vec<(String, &Value)> {
 pub(super) fn needs(root: &Value, warnings: &mut Warnings) {
     let needs = |material: &Value| {
         let textures = textures(material);
-        let sets: Vec<u64> = textures.iter().map(|(_, info)| set(info)).collect();
+        let sets: BTreeSet<u64> = textures.iter().map(|(_, info)| set(info)).collect();
         // Others make tangents from a normal map's coordinates.
         let bends = ["clearcoatNormalTexture", "anisotropyTexture"];
         let bent = textures.iter().any(|(path, _)| bends.iter().any(|name| path.ends_with(name)));
         (sets, bent && material.get("normalTexture").is_none())
     };
-    let all: Vec<(Vec<u64>, bool)> = list(root, "materials").iter().map(needs).collect();
+    let all: Vec<(BTreeSet<u64>, bool)> = list(root, "materials").iter().map(needs).collect();
     for (path, primitive) in selected(root, "meshes.*.primitives.*") {
         let material = primitive.get("material").and_then(Value::as_u64).and_then(|index| all.get(index as usize));
         let Some((sets, tangents)) = material else { continue };

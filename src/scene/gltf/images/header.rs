@@ -1,5 +1,8 @@
 //! What the first bytes of a picture say: its format and size.
 
+/// Most segments of a JPEG before its size: many images may name the same bytes.
+const MOST_SEGMENTS: usize = 10_000;
+
 /// What a picture claims to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::scene::gltf) struct Header {
@@ -69,7 +72,7 @@ fn png(bytes: &[u8]) -> Option<(u32, u32)> {
 /// Segments up to a frame's header (ITU-T T.81, B.2.2).
 fn jpeg(bytes: &[u8]) -> Option<(u32, u32)> {
     let mut at = 2;
-    loop {
+    for _ in 0..MOST_SEGMENTS {
         let [0xff, marker] = *bytes.get(at..at + 2)? else { return None };
         match marker {
             // Markers may be filled up, and some stand alone.
@@ -81,6 +84,7 @@ fn jpeg(bytes: &[u8]) -> Option<(u32, u32)> {
             _ => at += 2 + be(bytes, at + 2, 2).filter(|length| *length >= 2)? as usize,
         }
     }
+    None
 }
 
 /// The first chunk: extended, lossless or lossy (RFC 9649, 2.5 to 2.7).

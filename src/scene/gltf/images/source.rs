@@ -14,13 +14,14 @@ impl Document<'_> {
         self.raw.get("images")?.get(index)
     }
 
-    /// The bytes of image `index`, as its file has them; of a file beside the document at most so many.
-    fn image_beginning(&self, index: usize, most: u64) -> Result<Cow<'_, [u8]>, String> {
+    /// The bytes of image `index`, as its file has them; of a file beside the document at most so many; and how many
+    /// there are in all.
+    fn image_beginning(&self, index: usize, most: u64) -> Result<(Cow<'_, [u8]>, u64), String> {
         let image = self.declared_image(index).ok_or_else(|| format!("there is no images[{index}]"))?;
         let view = image.get("bufferView").and_then(Value::as_u64);
         let bytes = match (view, image.get("uri").and_then(Value::as_str)) {
-            (Some(view), _) => self.view_bytes(view as usize).map(Cow::Borrowed),
-            (None, Some(uri)) => buffers::from_uri(uri, self.folder, most).map(|(bytes, _)| Cow::Owned(bytes)),
+            (Some(view), _) => self.view_bytes(view as usize).map(|bytes| (Cow::Borrowed(bytes), bytes.len() as u64)),
+            (None, Some(uri)) => buffers::from_uri(uri, self.folder, most).map(|(bytes, all)| (Cow::Owned(bytes), all)),
             (None, None) => Err("it has neither a bufferView nor a uri".into()),
         };
         bytes.map_err(|fault| format!("images[{index}]: {fault}"))
@@ -28,7 +29,7 @@ impl Document<'_> {
 
     /// All bytes of image `index`.
     pub(in crate::scene::gltf) fn image_bytes(&self, index: usize) -> Result<Cow<'_, [u8]>, String> {
-        self.image_beginning(index, buffers::LARGEST)
+        self.image_beginning(index, buffers::LARGEST).map(|(bytes, _)| bytes)
     }
 
     /// The media type that the document says image `index` has.
@@ -38,14 +39,14 @@ impl Document<'_> {
         image.get("mimeType").and_then(Value::as_str).or_else(in_uri)
     }
 
-    /// What image `index` claims to be, from its first bytes.
-    pub(in crate::scene::gltf) fn image_header(&self, index: usize) -> Result<Header, String> {
-        let beginning = self.image_beginning(index, HEADER_BYTES)?;
+    /// What image `index` claims to be, from its first bytes, and how many it has.
+    pub(in crate::scene::gltf) fn image_header(&self, index: usize) -> Result<(Header, u64), String> {
+        let (beginning, length) = self.image_beginning(index, HEADER_BYTES)?;
         let header = match Header::of(&beginning) {
             Err(_) if beginning.len() as u64 == HEADER_BYTES => Header::of(&self.image_bytes(index)?),
             header => header,
         };
-        header.map_err(|fault| format!("images[{index}]: {fault}"))
+        header.map(|header| (header, length)).map_err(|fault| format!("images[{index}]: {fault}"))
     }
 }
 
