@@ -1,5 +1,5 @@
 //! `shaders/shared/{layout,bindings,features}.glsl` → Rust; `shaders/*.comp` → SPIR-V 1.5, each for both ways of fetching,
-//! plain and full (see `kernel.glsl`).
+//! plain, opaque and full (see `kernel.glsl`).
 
 use std::fmt::Write;
 use std::hash::{Hash, Hasher};
@@ -39,7 +39,7 @@ fn compile_kernels(out: &Path) -> Result<(), Box<dyn Error>> {
     for path in &kernels {
         let name = path.file_stem().and_then(|stem| stem.to_str()).ok_or("kernel without a name")?;
         for (fetch, fetch_macro) in [("texel", None), ("storage", Some("FETCH_FROM_STORAGE"))] {
-            for (variant, variant_macro) in [("plain", Some("PLAIN")), ("full", None)] {
+            for (variant, variant_macro) in [("plain", Some("PLAIN")), ("opaque", Some("OPAQUE")), ("full", None)] {
                 let code = compile(&compiler, path, fetch_macro.into_iter().chain(variant_macro))?;
                 code.hash(&mut hasher);
                 fs::write(out.join(format!("{name}.{fetch}.{variant}.spv")), code)?;
@@ -47,7 +47,7 @@ fn compile_kernels(out: &Path) -> Result<(), Box<dyn Error>> {
         }
         let code = |fetch: &str| {
             let file = |variant: &str| format!("{variant}: include_bytes!(\"{name}.{fetch}.{variant}.spv\")");
-            format!("{fetch}_fetch: SpirV {{ {}, {} }}", file("plain"), file("full"))
+            format!("{fetch}_fetch: SpirV {{ {}, {}, {} }}", file("plain"), file("opaque"), file("full"))
         };
         let constant = name.to_uppercase();
         writeln!(

@@ -9,24 +9,28 @@
 //! * `frames` — pictures: against the reference, closed forms, determinism, features
 //! * `textures` — samplers, maps, alpha and coloured shadows, against the reference and closed forms
 //! * `hard_scenes` — pictures that are hard on trees, stacks and f32
+//! * `hostile` — documents that ask for too much, documents changed at random
 //! * `measuring` — bench, stress and study as programs
 //! * `stress` — extreme cases hold, and fail without their safeguards
 //! * `study` — slopes, knobs, estimated against true error
 //! * `cli` — the program: exit codes, messages, files
 //! * `batch` — JSON jobs in, answers and pictures out, in one process: order, faults, limits, line by line
 //! * `test_models` — models that show whether they are drawn right, against what they looked like
-//! * `corpus` — real and broken files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
+//! * `broken` — the validator's broken files, what the fuzzer found, random changes: an error or a scene, never a panic
+//! * `corpus` — real files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
 
 mod architecture;
 mod batch;
+mod broken;
 mod bvh;
 mod cli;
 mod corpus;
 mod frames;
 mod gltf;
 mod hard_scenes;
+mod hostile;
 mod layout;
 mod measuring;
 mod poses;

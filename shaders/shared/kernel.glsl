@@ -15,6 +15,9 @@
 #define INSTANCES false
 #define RETRACE false
 #define MOLLER_TRUMBORE false
+#endif
+// So are textures and alpha, which make kernels twice as long to compile, where no material has any.
+#if defined(PLAIN) || defined(OPAQUE)
 #define TEXTURES false
 #define NORMAL_MAPS false
 #define ALPHA false

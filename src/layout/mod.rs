@@ -78,11 +78,13 @@ pub struct KernelCode {
     pub storage_fetch: SpirV,
 }
 
-/// SPIR-V of a kernel in two variants.
+/// SPIR-V of a kernel in three variants.
 #[derive(Clone, Copy, Debug)]
 pub struct SpirV {
     /// Without instances, textures, alpha, tracing again and other triangle tests, whatever its specialization constants say.
     pub plain: &'static [u8],
+    /// Without textures and alpha.
+    pub opaque: &'static [u8],
     /// With everything.
     pub full: &'static [u8],
 }
@@ -91,10 +93,10 @@ impl SpirV {
     /// The smallest variant that has these features.
     pub fn with(&self, features: Features) -> &'static [u8] {
         let Features { instances, retrace, moller_trumbore, textures, alpha, layers, .. } = features;
-        if instances || retrace || moller_trumbore || textures || alpha || layers {
-            self.full
-        } else {
-            self.plain
+        match (textures || alpha || layers, instances || retrace || moller_trumbore) {
+            (true, _) => self.full,
+            (false, true) => self.opaque,
+            (false, false) => self.plain,
         }
     }
 }

@@ -9,7 +9,6 @@
 use super::Soup;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// How many times its distance from the eye a triangle or an edge may be long. Errors are then at most this many millionths of
 /// the distance. Measured, not derived: with 64, slivers 170 m long 4 m away shadowed themselves here and there; with 16, up to 7 in 10 000 reflections
@@ -19,6 +18,9 @@ const LENGTHS: f64 = 32.0;
 const NEAREST: f64 = 1e-13;
 /// A weight up to which a point lies on the edge, which is cut by itself.
 const ON_EDGE: f64 = 1e-9;
+
+/// Most pieces, but for those of one triangle more: a triangle becomes thousands of them at worst.
+const MOST_PIECES: usize = 1 << 22;
 
 /// A corner of a piece.
 #[derive(Clone, Copy)]
@@ -135,23 +137,50 @@ impl Soup {
         }
     }
 
-    /// Puts the attributes of a piece, whose corners have these weights in its triangle, where its positions are.
-    fn set_attributes(&mut self, place: Range<usize>, of: &Attributes, weights: [DVec3; 3]) {
-        if let Some(normals) = of.normals {
-            self.normals.splice(place.clone(), [weights.map(|weights| mix(normals, weights))]);
-        }
-        if let Some(colors) = of.colors {
-            self.colors.splice(place.clone(), [weights.map(|weights| mix(colors, weights))]);
-        }
-        if let Some(sets) = of.texcoords {
-            let mixed = |weights| [0, 1].map(|set| mix(sets.map(|corner| corner[set]), weights));
-            self.texcoords.splice(place.clone(), [weights.map(mixed)]);
-        }
-        if let Some(tangents) = of.tangents {
+    /// Adds a piece of a triangle with these attributes, whose corners have these weights in it.
+    fn push_piece(&mut self, piece: &[Corner; 3], of: &Attributes) {
+        let weights = piece.map(|corner| corner.weights);
+        self.positions.push(piece.map(|corner| corner.position));
+        self.normals.extend(of.normals.map(|normals| weights.map(|weights| mix(normals, weights))));
+        self.colors.extend(of.colors.map(|colors| weights.map(|weights| mix(colors, weights))));
+        self.texcoords.extend(
+            of.texcoords
+                .map(|sets| weights.map(|weights| [0, 1].map(|set| mix(sets.map(|corner| corner[set]), weights)))),
+        );
+        self.tangents.extend(of.tangents.map(|tangents| {
             // The sign is the same at all corners.
-            let mixed = |weights| mix(tangents, weights).truncate().extend(tangents[0].w);
-            self.tangents.splice(place, [weights.map(mixed)]);
+            weights.map(|weights| mix(tangents, weights).truncate().extend(tangents[0].w))
+        }));
+    }
+
+    /// Puts the last triangle of another soup in the place of a triangle, but for its material and flags.
+    fn replace_with_last(&mut self, primitive: usize, from: &mut Soup) {
+        fn last<T>(to: &mut [T], primitive: usize, from: &mut Vec<T>) {
+            if let Some(value) = from.pop() {
+                to[primitive] = value;
+            }
         }
+        last(&mut self.positions, primitive, &mut from.positions);
+        last(&mut self.normals, primitive, &mut from.normals);
+        last(&mut self.colors, primitive, &mut from.colors);
+        last(&mut self.texcoords, primitive, &mut from.texcoords);
+        last(&mut self.tangents, primitive, &mut from.tangents);
+    }
+
+    /// Puts the triangles of another soup behind the first `at`.
+    fn insert(&mut self, at: usize, from: Soup) {
+        fn insert<T>(to: &mut Vec<T>, at: usize, from: Vec<T>) {
+            if !from.is_empty() {
+                to.splice(at..at, from);
+            }
+        }
+        insert(&mut self.positions, at, from.positions);
+        insert(&mut self.materials, at, from.materials);
+        insert(&mut self.flags, at, from.flags);
+        insert(&mut self.normals, at, from.normals);
+        insert(&mut self.colors, at, from.colors);
+        insert(&mut self.texcoords, at, from.texcoords);
+        insert(&mut self.tangents, at, from.tangents);
     }
 
     /// Cuts triangles that reach from near the eye to very far away into pieces that grow with their distance from it, so that f32
@@ -164,37 +193,33 @@ impl Soup {
         let eye = Eye { position: eye, nearest: (self.hi - self.lo).max_element() * NEAREST };
         let cut: Vec<usize> =
             range.clone().into_par_iter().filter(|index| eye.may_cut(&self.positions[*index])).collect();
-        let mut all = Vec::new();
+        let mut added = Soup::default();
         for primitive in cut {
+            if added.len() > MOST_PIECES {
+                self.warnings.push("approximated: too many triangles reach from near the camera to far away".into());
+                break;
+            }
             let [a, b, c] = self.positions[primitive];
             let corner = |position, weights| Corner { position, weights };
             let mut pieces = Vec::new();
             dice([corner(a, DVec3::X), corner(b, DVec3::Y), corner(c, DVec3::Z)], &eye, &mut pieces);
-            if pieces.len() > 1 {
-                all.push((primitive, pieces));
+            let Some((first, rest)) = pieces.split_first().filter(|(_, rest)| !rest.is_empty()) else { continue };
+            let attributes = self.attributes_of(primitive);
+            let mut one = Soup::default();
+            one.push_piece(first, &attributes);
+            self.replace_with_last(primitive, &mut one);
+            for piece in rest {
+                added.push_piece(piece, &attributes);
+                added.materials.push(self.materials[primitive]);
+                added.flags.push(self.flags[primitive]);
             }
         }
         // Behind the triangles that stand alone, so that these keep their numbers.
-        let mut at = range.end;
-        let added: usize = all.iter().map(|(_, pieces)| pieces.len() - 1).sum();
-        if added == 0 {
-            return;
-        }
-        for (primitive, pieces) in all {
-            let (material, flags) = (self.materials[primitive], self.flags[primitive]);
-            let attributes = self.attributes_of(primitive);
-            for (index, piece) in pieces.into_iter().enumerate() {
-                let place = if index == 0 { primitive..primitive + 1 } else { at..at };
-                at += usize::from(index > 0);
-                self.positions.splice(place.clone(), [piece.map(|corner| corner.position)]);
-                self.materials.splice(place.clone(), [material]);
-                self.flags.splice(place.clone(), [flags]);
-                self.set_attributes(place, &attributes, piece.map(|corner| corner.weights));
-            }
-        }
-        self.parts[0].end += added;
+        let count = added.len();
+        self.insert(range.end, added);
+        self.parts[0].end += count;
         for part in &mut self.parts[1..] {
-            *part = part.start + added..part.end + added;
+            *part = part.start + count..part.end + count;
         }
     }
 }

@@ -69,6 +69,15 @@ pub struct Mesh {
     pub material: usize,
 }
 
+impl Mesh {
+    /// Numbers of four bytes that it takes.
+    pub fn numbers(&self) -> u64 {
+        let vertices =
+            3 * self.positions.len() + 3 * self.normals.len() + 4 * self.texcoords.len() + 4 * self.colors.len();
+        (vertices + 12 * self.tangents.len() + 3 * self.triangles.len()) as u64
+    }
+}
+
 /// A mesh somewhere in the world.
 #[derive(Clone, Debug)]
 pub struct Instance {
@@ -99,6 +108,8 @@ pub struct Scene {
     pub has_lights: bool,
     /// Cameras with their names, world space.
     pub cameras: Vec<(String, Camera)>,
+    /// Bytes that the triangles of all instances may take in a [`Soup`]; `None` for as many as there are.
+    pub max_memory: Option<u64>,
     /// Extensions that the file uses.
     pub extensions: Vec<ExtensionUse>,
     /// What was approximated, ignored or dropped, one sentence each.

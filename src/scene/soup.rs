@@ -84,6 +84,10 @@ const MAX_MATERIALS: usize = 1 << MATERIAL_BITS;
 /// Sizes of scenes. The device gets them scaled; this is what the scene's own f32 positions and intensities can mean.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
+/// Most points times places that are gone through for the box around a shared mesh; beyond them its own box is placed, which may be
+/// larger than what is in it.
+const MOST_PLACED_POINTS: usize = 1 << 31;
+
 /// Bytes that a triangle takes on the device: corners and its share of the tree; one of its attributes.
 const TRIANGLE_BYTES: usize = 48 + 16;
 const ATTRIBUTE_BYTES: usize = 48;
@@ -140,6 +144,11 @@ impl Soup {
             let count = scene.materials.len();
             return Err(Error::content(&scene.name, format!("{count} materials: at most {MAX_MATERIALS}")));
         }
+        let bytes = (count * attributes.host_bytes()) as u64;
+        if let Some(most) = scene.max_memory.filter(|most| bytes > *most) {
+            let message = format!("{count} triangles take {bytes} bytes, more than {most} (see --max-memory)");
+            return Err(Error::content(&scene.name, message));
+        }
         let mut soup = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, ..Self::default() };
         soup.positions.reserve(count);
         let mut not_finite = 0;
@@ -159,8 +168,12 @@ impl Soup {
             soup.placements.push(Placement { part: 0, world_from_part: DMat4::IDENTITY });
             soup.placed = own;
         }
+        let mut places = vec![Vec::new(); scene.meshes.len()];
+        for instance in scene.instances.iter().filter(|instance| shared[instance.mesh]) {
+            places[instance.mesh].push(instance.world_from_object);
+        }
         for mesh in (0..scene.meshes.len()).filter(|mesh| shared[*mesh]) {
-            not_finite += soup.add_shared(scene, mesh, attributes, &mut flattened[mesh]);
+            not_finite += soup.add_shared(scene, mesh, attributes, &places[mesh], &mut flattened[mesh]);
         }
         for (mesh, count) in scene.meshes.iter().zip(flattened).filter(|(_, count)| *count > 0) {
             let name = &mesh.name;
@@ -182,8 +195,15 @@ impl Soup {
         Ok(soup)
     }
 
-    /// Adds a mesh once and all its instances as placements; returns how many triangles are not finite.
-    fn add_shared(&mut self, scene: &Scene, mesh: usize, attributes: Attributes, flattened: &mut usize) -> usize {
+    /// Adds a mesh once and the places where it stands as placements; returns how many triangles are not finite.
+    fn add_shared(
+        &mut self,
+        scene: &Scene,
+        mesh: usize,
+        attributes: Attributes,
+        places: &[DMat4],
+        flattened: &mut usize,
+    ) -> usize {
         let first = self.positions.len();
         let once = Instance { mesh, world_from_object: DMat4::IDENTITY };
         let not_finite = self.add(scene, &once, attributes).not_finite;
@@ -192,12 +212,14 @@ impl Soup {
         let mut points: Vec<DVec3> = self.positions[first..].iter().flatten().copied().collect();
         points.sort_by(|a, b| a.to_array().map(f64::to_bits).cmp(&b.to_array().map(f64::to_bits)));
         points.dedup();
-        for instance in scene.instances.iter().filter(|instance| instance.mesh == mesh) {
-            if is_flat(&instance.world_from_object) {
+        if points.len().saturating_mul(places.len()) > MOST_PLACED_POINTS {
+            points = box_corners(&points);
+        }
+        for world_from_part in places.iter().copied() {
+            if is_flat(&world_from_part) {
                 *flattened += 1;
                 continue;
             }
-            let world_from_part = instance.world_from_object;
             for point in &points {
                 let point = world_from_part.transform_point3(*point);
                 self.lo = self.lo.min(point);
@@ -320,10 +342,31 @@ struct Attributes {
 }
 
 impl Attributes {
+    /// Bytes that a triangle takes in the soup.
+    fn host_bytes(&self) -> usize {
+        let corners = [
+            (self.smooth, size_of::<[Vec3; 3]>()),
+            (self.colored, size_of::<[Vec4; 3]>()),
+            (self.textured, size_of::<[[Vec2; 2]; 3]>()),
+            (self.tangents, size_of::<[Vec4; 3]>()),
+        ];
+        let attributes: usize = corners.into_iter().filter(|(has, _)| *has).map(|(_, bytes)| bytes).sum();
+        size_of::<[DVec3; 3]>() + size_of::<u32>() + size_of::<TriangleFlags>() + attributes
+    }
+
     /// How many there are.
     fn count(&self) -> usize {
         [self.smooth, self.colored, self.textured, self.tangents].into_iter().filter(|has| *has).count()
     }
+}
+
+/// The corners of the box around points.
+fn box_corners(points: &[DVec3]) -> Vec<DVec3> {
+    let lo = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let hi = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let corner =
+        |i: usize| DVec3::from_array(std::array::from_fn(|axis| if i >> axis & 1 == 0 { lo[axis] } else { hi[axis] }));
+    (0..8).map(corner).collect()
 }
 
 /// The transform has no volume.

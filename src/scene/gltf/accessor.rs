@@ -11,8 +11,6 @@ const MOST_UNBACKED: u64 = 1 << 20;
 /// Most numbers that all meshes and textures of a document are made of, unless something else is asked for: 2 GiB. Many primitives may name the same
 /// bytes.
 pub(super) const MOST_NUMBERS: u64 = 1 << 29;
-/// Most numbers that are checked against their bounds and for being finite.
-const MOST_CHECKED: u64 = 1 << 28;
 
 /// Values of an accessor, `components` to an element.
 #[derive(Clone)]
@@ -125,7 +123,7 @@ impl Document<'_> {
     }
 
     /// Numbers in an accessor, as it claims.
-    fn numbers(&self, index: usize) -> u64 {
+    pub fn numbers(&self, index: usize) -> u64 {
         let accessor = &self.root.accessors[index];
         let components = match &accessor.type_ {
             Checked::Valid(shape) => shape.multiplicity() as u64,
@@ -134,42 +132,9 @@ impl Document<'_> {
         accessor.count.0.saturating_mul(components)
     }
 
-    /// Warns of accessors whose data do not keep to their min and max, or are not finite.
-    pub fn check_data(&mut self) {
-        let mut checked = 0_u64;
-        let mut faults = Vec::new();
-        for index in 0..self.root.accessors.len() {
-            let accessor = &self.root.accessors[index];
-            checked = checked.saturating_add(self.numbers(index));
-            // Without data there are only zeros, and beyond the limit a check would take longer than the picture.
-            if (accessor.buffer_view.is_some() || accessor.sparse.is_some()) && checked <= MOST_CHECKED {
-                faults.extend(self.data_fault(index));
-            }
-        }
-        faults.into_iter().for_each(|fault| self.warnings.add(fault));
-    }
-
-    fn data_fault(&self, index: usize) -> Option<String> {
-        let accessor = &self.root.accessors[index];
-        let Elements { components, values } = self.read(index, 0.0, |kind, bytes| number(kind, false, bytes)).ok()?;
-        if let Some(bad) = values.iter().find(|value| !value.is_finite()) {
-            return Some(format!("accessors[{index}]: its data contain {bad}"));
-        }
-        for (name, declared, pick) in
-            [("min", &accessor.min, f32::min as fn(f32, f32) -> f32), ("max", &accessor.max, f32::max)]
-        {
-            let Some(declared) = declared.as_ref().and_then(|bounds| bounds.as_array()) else { continue };
-            for (component, declared) in declared.iter().enumerate().take(components) {
-                let own = values.iter().skip(component).step_by(components).copied().reduce(pick)?;
-                let declared = declared.as_f64()? as f32;
-                if own != declared {
-                    return Some(format!(
-                        "accessors[{index}].{name}[{component}] is {declared}, but its data say {own}"
-                    ));
-                }
-            }
-        }
-        None
+    /// Elements as floats that are looked at and not kept.
+    pub fn glance(&self, index: usize, normalized: bool) -> Option<Elements<f32>> {
+        self.read(index, 0.0, |kind, bytes| number(kind, normalized, bytes)).ok()
     }
 
     fn read<T: Copy>(&self, index: usize, zero: T, convert: impl Fn(ComponentType, &[u8]) -> T) -> Result<Elements<T>> {
@@ -251,6 +216,9 @@ impl Document<'_> {
         };
         let index_kind = index_kind.0;
         let (count, components) = (sparse.count.0, elements.components);
+        if count > self.root.accessors[index].count.0 {
+            return Err(refuse("it replaces more elements than there are"));
+        }
         let element = kind.size() * components;
         let places =
             self.layout(index, sparse.indices.buffer_view, sparse.indices.byte_offset.0, count, index_kind.size())?;

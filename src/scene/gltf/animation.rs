@@ -1,11 +1,13 @@
 //! Animations: key frames → what a channel's target is at a time (glTF 2.0, 3.11 and appendix C).
 
+use super::accessor::Elements;
 use super::nodes::unit;
 use super::{Document, Warnings};
 use crate::error::Result;
 use glam::DQuat;
 use serde::Deserialize;
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// An animation as the file declares it.
 #[derive(Default, Deserialize)]
@@ -14,6 +16,22 @@ pub(super) struct Declared {
     pub name: String,
     pub channels: Vec<Channel>,
     samplers: Vec<Sampler>,
+}
+
+impl Declared {
+    /// Accessors of the times of channels.
+    fn inputs(&self) -> impl Iterator<Item = usize> + '_ {
+        self.channels.iter().filter_map(|channel| self.samplers.get(channel.sampler?)?.input)
+    }
+
+    /// What each channel moves, whether by a cubic spline, and the accessors of its times and values.
+    pub fn uses(&self) -> impl Iterator<Item = (&str, bool, usize, usize)> {
+        self.channels.iter().filter_map(|channel| {
+            let sampler = self.samplers.get(channel.sampler?)?;
+            let is_cubic = sampler.interpolation.as_deref() == Some("CUBICSPLINE");
+            Some((channel.target.path.as_str(), is_cubic, sampler.input?, sampler.output?))
+        })
+    }
 }
 
 /// A property of a node, and the sampler that moves it.
@@ -148,15 +166,18 @@ fn turned(a: &[f64], b: &[f64], t: f64) -> Vec<f64> {
 }
 
 impl Document<'_> {
-    /// Time of an animation's last key: of all its samplers whose times can be read.
-    pub fn duration(&self, animation: usize) -> f64 {
-        let declared = &self.animations[animation];
-        let used = declared.channels.iter().filter_map(|channel| declared.samplers.get(channel.sampler?)?.input);
-        let mut inputs: Vec<usize> = used.collect();
-        inputs.sort_unstable();
-        inputs.dedup();
-        let ends = inputs.into_iter().filter_map(|input| self.times(input).ok()?.last().copied());
-        ends.fold(0.0, |longest, end| longest.max(f64::from(end)))
+    /// Time of each animation's last key: of all its samplers whose times can be read.
+    pub fn durations(&self) -> Vec<f64> {
+        // Many may name the same times, of which nothing is kept.
+        let mut ends: BTreeMap<usize, f64> = BTreeMap::new();
+        let mut end = |input: usize| {
+            *ends.entry(input).or_insert_with(|| {
+                let times = self.glance(input, true).and_then(|times| checked_times(times).ok());
+                times.and_then(|times| times.last().copied()).map_or(0.0, f64::from)
+            })
+        };
+        let mut duration = |own: &Declared| own.inputs().map(&mut end).fold(0.0, f64::max);
+        self.animations.iter().map(&mut duration).collect()
     }
 
     /// The tracks of an animation; channels that cannot be used are left out with a warning.
@@ -215,16 +236,20 @@ impl Document<'_> {
         Ok(Some(Track { node, path, times, width, values: output.values, interpolation }))
     }
 
-    /// Times of keys: finite, not decreasing, at least one.
+    /// Times of keys.
     fn times(&self, accessor: usize) -> Result<Vec<f32>, String> {
-        let times = self.floats(accessor).map_err(|error| error.to_string())?;
-        if times.components != 1 || times.values.is_empty() {
-            return Err("its times are no scalars".into());
-        }
-        let increase = times.values.windows(2).all(|pair| pair[0] <= pair[1]);
-        if !increase || !times.values.iter().all(|time| time.is_finite()) {
-            return Err("its times do not increase".into());
-        }
-        Ok(times.values)
+        checked_times(self.floats(accessor).map_err(|error| error.to_string())?)
     }
+}
+
+/// Times of keys: finite, not decreasing, at least one.
+fn checked_times(Elements { components, values }: Elements<f32>) -> Result<Vec<f32>, String> {
+    if components != 1 || values.is_empty() {
+        return Err("its times are no scalars".into());
+    }
+    let increase = values.windows(2).all(|pair| pair[0] <= pair[1]);
+    if !increase || !values.iter().all(|time| time.is_finite()) {
+        return Err("its times do not increase".into());
+    }
+    Ok(values)
 }

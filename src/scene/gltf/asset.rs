@@ -13,8 +13,8 @@ use std::collections::BTreeSet;
 
 /// Most instances of meshes in a scene.
 const MOST_INSTANCES: usize = 1 << 22;
-/// Most vertices of all meshes that stand in a pose of their own.
-const MOST_POSED: usize = 1 << 27;
+/// Numbers of four bytes that an instance takes: its transform twice over, while the scene is filled.
+const INSTANCE_NUMBERS: u64 = 72;
 
 /// A file that was read and checked. What it shows at a time is [`Asset::scene`].
 #[derive(Debug)]
@@ -64,11 +64,12 @@ struct Picture {
 
 impl Document<'_> {
     /// Reads all that poses need.
-    pub(super) fn into_asset(mut self, name: String, options: &ReadOptions) -> Result<Asset> {
+    pub(super) fn asset(&mut self, name: String, options: &ReadOptions) -> Result<Asset> {
         if let Some(at) = options.at.filter(|at| !at.is_finite()) {
             return Err(Error::Usage(format!("time {at}: must be a number of seconds")));
         }
-        let mut base = Scene { name, extensions: self.extensions(), ..Scene::default() };
+        let (extensions, max_memory) = (self.extensions(), options.max_memory);
+        let mut base = Scene { name, extensions, max_memory, ..Scene::default() };
         self.check_bind_matrices();
         let contents = self.contents();
         let variant = options.variant.as_deref();
@@ -95,19 +96,20 @@ impl Document<'_> {
                 self.warnings.add(format!("ignored: a light: {fault}"));
             }
         }
-        if let Some(ignored) = self.warnings.order.iter().find(|text| options.strict && text.starts_with("ignored:")) {
+        if let Some(ignored) = self.warnings.ignored.as_ref().filter(|_| options.strict) {
             return Err(self.refuse(format!("--strict: {ignored}")));
         }
         let file = self.file.to_owned();
-        base.warnings = self.warnings.into_lines();
+        base.warnings = std::mem::take(&mut self.warnings).into_lines();
         let at = options.at.unwrap_or(0.0);
         Ok(Asset { file, base, shapes, primitives, hierarchy, skins, lights, projections, tracks, at, contents })
     }
 
     fn contents(&self) -> Contents {
+        let durations = self.durations();
         let animation = |(index, own): (usize, &super::animation::Declared)| AnimationSummary {
             name: own.name.clone(),
-            duration: self.duration(index),
+            duration: durations[index],
             channels: own.channels.len(),
         };
         let meshes = self.root.meshes.iter().enumerate();
@@ -168,7 +170,7 @@ impl Document<'_> {
         Ok(skins)
     }
 
-    /// Refuses what would be too large before any of it is made.
+    /// Refuses what would be too large before any of it is made: instances, and meshes in poses of their own.
     fn check_sizes(
         &self,
         hierarchy: &Hierarchy,
@@ -176,24 +178,22 @@ impl Document<'_> {
         primitives: &[Vec<usize>],
         shapes: &[Shape],
     ) -> Result<()> {
-        let (mut instances, mut vertices) = (0_usize, 0_usize);
+        let (mut instances, mut posed) = (0_usize, 0_u64);
         for node in hierarchy.visible() {
             let Some(mesh) = node.mesh else { continue };
             let places = node.places.as_ref().map_or(1, Vec::len);
             instances = instances.saturating_add(places.saturating_mul(primitives[mesh].len()));
             for own in &primitives[mesh] {
                 if node.skin.is_some() || !shapes[*own].targets.is_empty() {
-                    vertices = vertices.saturating_add(base.meshes[*own].positions.len());
+                    posed = posed.saturating_add(base.meshes[*own].numbers());
                 }
             }
         }
         if instances > MOST_INSTANCES {
             return Err(self.refuse(format!("more than {MOST_INSTANCES} instances of meshes")));
         }
-        if vertices > MOST_POSED {
-            return Err(self.refuse(format!("more than {MOST_POSED} vertices of meshes with skins or morph targets")));
-        }
-        Ok(())
+        self.spend_numbers(INSTANCE_NUMBERS * instances as u64)?;
+        self.spend_numbers(posed)
     }
 }
 

@@ -3,17 +3,19 @@
 use super::{meshopt, Document, Warnings};
 use ::gltf::json::{Buffer, Root};
 use base64::{engine::general_purpose, Engine};
+use std::io::Read;
 use std::path::{Component, Path};
 
-/// Largest buffer, so that a declared length alone allocates nothing absurd.
-const LARGEST: u64 = 1 << 34;
+/// Largest file that is read, so that a declared length alone allocates nothing absurd.
+pub(super) const LARGEST: u64 = 1 << 34;
 
-/// Loads every buffer, each at least as long as it declares. One that cannot be had refuses the file only when something
-/// that is drawn needs it.
+/// Loads every buffer, each at least as long as it declares, together at most `left` bytes: many may name the same file. One
+/// that cannot be had refuses the file only when something that is drawn needs it.
 pub(super) fn load(
     root: &Root,
     binary: Option<&[u8]>,
     folder: Option<&Path>,
+    mut left: u64,
     warnings: &mut Warnings,
 ) -> Vec<Result<Vec<u8>, String>> {
     let fallbacks = meshopt::fallbacks(root, binary.is_some());
@@ -24,20 +26,23 @@ pub(super) fn load(
             buffers.push(Err(format!("buffers[{index}] only stands in for compressed data")));
             continue;
         }
-        let bytes = load_one(buffer, binary, folder);
         let declared = buffer.byte_length.0;
-        let bytes = bytes.and_then(|bytes| match bytes.len() as u64 {
+        let bytes = match left.checked_sub(declared) {
+            None => Err("it takes more memory than is left (see --max-memory)".into()),
+            Some(_) => load_one(buffer, binary, folder),
+        };
+        let bytes = bytes.and_then(|(bytes, length)| match length {
             length if length < declared => Err(format!("byteLength is {declared}, but there are only {length} bytes")),
-            _ => Ok(bytes),
+            length => Ok((bytes, length)),
         });
         // A BIN chunk may be padded by up to three bytes.
         let most = declared.saturating_add(if buffer.uri.is_none() { 3 } else { 0 });
         match bytes {
-            Ok(bytes) => {
-                if bytes.len() as u64 > most {
-                    let length = bytes.len();
+            Ok((bytes, length)) => {
+                if length > most {
                     warnings.add(format!("buffers[{index}]: byteLength is {declared}, but there are {length} bytes"));
                 }
+                left -= declared;
                 buffers.push(Ok(bytes));
             }
             Err(fault) => {
@@ -77,23 +82,25 @@ pub(super) fn slice(
     part.ok_or_else(|| format!("{length} bytes from {offset} on do not fit into buffers[{buffer}]"))
 }
 
-fn load_one(buffer: &Buffer, binary: Option<&[u8]>, folder: Option<&Path>) -> Result<Vec<u8>, String> {
+/// The bytes of a buffer, at least as many as it declares if there are, and how many there are.
+fn load_one(buffer: &Buffer, binary: Option<&[u8]>, folder: Option<&Path>) -> Result<(Vec<u8>, u64), String> {
+    let declared = buffer.byte_length.0;
     match (&buffer.uri, binary) {
-        _ if buffer.byte_length.0 == 0 || buffer.byte_length.0 > LARGEST => {
-            Err(format!("byteLength {} is not a sensible length", buffer.byte_length.0))
-        }
-        (Some(uri), _) => from_uri(uri, folder),
-        (None, Some(binary)) => Ok(binary.to_vec()),
+        _ if declared == 0 || declared > LARGEST => Err(format!("byteLength {declared} is not a sensible length")),
+        (Some(uri), _) => from_uri(uri, folder, declared),
+        (None, Some(binary)) => Ok((binary[..binary.len().min(declared as usize)].to_vec(), binary.len() as u64)),
         (None, None) => Err("it has no uri, and there is no BIN chunk for it".into()),
     }
 }
 
-/// The bytes that a URI of the document holds or names.
-pub(super) fn from_uri(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
+/// The bytes that a URI of the document holds or names, of a file at most the first `most`, and how many there are in all.
+pub(super) fn from_uri(uri: &str, folder: Option<&Path>, most: u64) -> Result<(Vec<u8>, u64), String> {
     if uri.starts_with("data:") {
-        decode_data_uri(uri)
+        let bytes = decode_data_uri(uri)?;
+        let length = bytes.len() as u64;
+        Ok((bytes, length))
     } else {
-        read_beside(uri, folder)
+        read_beside(uri, folder, most)
     }
 }
 
@@ -114,7 +121,7 @@ fn decode_data_uri(uri: &str) -> Result<Vec<u8>, String> {
     .map_err(|error| format!("the data URI is not base64: {error}"))
 }
 
-fn read_beside(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
+fn read_beside(uri: &str, folder: Option<&Path>, most: u64) -> Result<(Vec<u8>, u64), String> {
     if uri.contains("://") {
         return Err(format!("'{uri}' is a network address; only files beside the document are read"));
     }
@@ -131,5 +138,10 @@ fn read_beside(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, String> {
     if !data.is_file() || data.len() > LARGEST {
         return Err(refuse(&"it is no file of a sensible size"));
     }
-    std::fs::read(&path).map_err(|error| format!("cannot read {}: {error}", path.display()))
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(&path).map_err(|error| refuse(&error))?;
+    file.take(most).read_to_end(&mut bytes).map_err(|error| refuse(&error))?;
+    // A file that has shrunk meanwhile has no more than was read.
+    let length = if (bytes.len() as u64) < most { bytes.len() as u64 } else { data.len() };
+    Ok((bytes, length))
 }

@@ -19,7 +19,8 @@ pub struct ReadOptions {
     pub at: Option<f64>,
     /// Textures are halved until neither side has more pixels. Default: none is.
     pub max_texture_size: Option<u32>,
-    /// Bytes that meshes and textures may take once they are read. Default: 2 GiB.
+    /// Bytes that each of these may take: the buffers; what is read of them, textures too; the triangles of all instances.
+    /// Default: 2 GiB for the first two each, and any number of triangles.
     pub max_memory: Option<u64>,
     /// A file with anything that is ignored is refused.
     pub strict: bool,

@@ -2,6 +2,7 @@
 
 use super::Document;
 use crate::scene::{ExtensionUse, Standing};
+use std::collections::BTreeSet;
 use Standing::{Approximated, Exact};
 
 /// Extensions that are read.
@@ -45,9 +46,11 @@ impl Document<'_> {
     pub fn extensions(&mut self) -> Vec<ExtensionUse> {
         let (used, required) = (&self.root.extensions_used, &self.root.extensions_required);
         let mut all: Vec<ExtensionUse> = Vec::new();
+        let is_required: BTreeSet<&String> = required.iter().collect();
+        let mut seen = BTreeSet::new();
         for name in used.iter().chain(required) {
-            if !all.iter().any(|own| own.name == *name) {
-                let (required, standing) = (required.contains(name), standing(name));
+            if seen.insert(name) {
+                let (required, standing) = (is_required.contains(name), standing(name));
                 all.push(ExtensionUse { name: name.clone(), required, standing });
             }
         }

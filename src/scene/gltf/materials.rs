@@ -1,6 +1,6 @@
 //! glTF materials → [`Material`], with their extensions.
 
-use super::Document;
+use super::{check, Document};
 use crate::scene::{
     AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Lobes, Map, Maps, Material, Scene, Sheen,
     Volume, Whitted,
@@ -8,6 +8,7 @@ use crate::scene::{
 use glam::DVec3;
 use serde::Deserialize;
 use serde_json::Value;
+use std::rc::Rc;
 
 /// `extras.whitted` of a material: exact coefficients. What is not given is 0 (shininess 1).
 #[derive(Deserialize)]
@@ -102,8 +103,8 @@ impl<'a> Properties<'a> {
 impl Document<'_> {
     /// Adds all materials and, behind them, glTF's default material for primitives that name none.
     pub fn add_materials(&mut self, scene: &mut Scene) {
-        let materials = self.raw("materials");
-        for (index, material) in materials.iter().enumerate() {
+        let raw = Rc::clone(&self.raw);
+        for (index, material) in check::list(&raw, "materials").iter().enumerate() {
             let (path, own) = (format!("materials[{index}]"), Properties(material));
             let mut material = self.material(&path, own);
             self.read_spec_gloss(&path, own, index, &mut material);

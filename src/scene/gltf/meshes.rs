@@ -3,13 +3,16 @@
 use super::accessor::Elements;
 use super::pose::Shape;
 use super::skin::Influences;
-use super::{draco, Document};
+use super::{draco, short, Document};
 use crate::error::Result;
 use crate::scene::{Maps, Mesh, Scene};
 use ::gltf::json::mesh::{Mode, Primitive};
 use ::gltf::json::validation::Checked;
 use glam::{Vec2, Vec3, Vec4};
 use std::collections::BTreeSet;
+
+/// Numbers that the tangents of a triangle take.
+const TANGENT_NUMBERS: u64 = 12;
 
 impl Document<'_> {
     /// Adds every primitive that can be drawn, with the materials of a variant; answers, for each glTF mesh, the indices of
@@ -30,7 +33,7 @@ impl Document<'_> {
                 let material = material.unwrap_or(default_material);
                 let maps = scene.materials[material].drawn_maps();
                 let Some(mut mesh) = self.primitive(&place, &primitive, &maps)? else { continue };
-                mesh.name = self.root.meshes[index].name.clone().unwrap_or(place.clone());
+                mesh.name = short(self.root.meshes[index].name.as_deref().unwrap_or(&place)).into_owned();
                 mesh.material = material;
                 shapes.push(self.shape(&place, &primitive, &mesh, skinned.contains(&index))?);
                 indices.push(scene.meshes.len());
@@ -82,6 +85,9 @@ impl Document<'_> {
         if let Some(beyond) = corners.iter().find(|corner| **corner as usize >= count) {
             return Err(self.refuse(format!("{place}: index {beyond} lies beyond its {count} vertices")));
         }
+        // Of strips and fans nearly every corner becomes a triangle; a normal map adds tangents.
+        let most = if mode == Mode::Triangles { corners.len() / 3 } else { corners.len() } as u64;
+        self.spend_numbers(most * if maps.normal.is_some() { 3 + TANGENT_NUMBERS } else { 3 })?;
         let triangles = triangles(mode, &corners);
         if triangles.is_empty() || (mode == Mode::Triangles && corners.len() % 3 != 0) {
             self.warnings.add(format!("ignored: {place} has {} corners, not whole triangles", corners.len()));

@@ -16,6 +16,7 @@ mod buffers;
 mod check;
 mod choice;
 mod container;
+mod data;
 mod draco;
 mod extensions;
 mod images;
@@ -37,6 +38,7 @@ use super::Scene;
 use crate::error::{Error, Result};
 use ::gltf::json::Root;
 use serde_json::Value;
+use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -98,7 +100,24 @@ pub fn open_bytes(
     document.most_numbers = options.max_memory.map_or(accessor::MOST_NUMBERS, |bytes| bytes / 4);
     document.load(container.binary, folder);
     document.check_data();
-    document.into_asset(name, options)
+    document.asset(name, options).map_err(|error| with_faults(error, &document.warnings))
+}
+
+/// Most faults that are named beside the one that refuses a file.
+const MOST_FAULTS: usize = 3;
+
+/// An error, with the faults that were found before: they may be why.
+fn with_faults(error: Error, warnings: &Warnings) -> Error {
+    let Error::Content { file, mut message } = error else { return error };
+    let is_fault = |text: &&String| {
+        let is_remark = ["ignored:", "approximated:", "not played:"].iter().any(|start| text.starts_with(start));
+        !is_remark && !message.contains(text.as_str())
+    };
+    let faults: Vec<&str> = warnings.order.iter().filter(is_fault).map(String::as_str).take(MOST_FAULTS).collect();
+    if !faults.is_empty() {
+        message = format!("{message} (also: {})", faults.join("; "));
+    }
+    Error::Content { file, message }
 }
 
 /// A parsed and checked document.
@@ -125,7 +144,7 @@ struct Document<'a> {
     /// Materials that wait for their pictures to become metallic-roughness ones.
     unconverted: Vec<spec_gloss::Unconverted>,
     /// Materials, textures and the like as they are in the file.
-    raw: Value,
+    raw: Rc<Value>,
 }
 
 impl<'a> Document<'a> {
@@ -140,7 +159,7 @@ impl<'a> Document<'a> {
         check::required_extensions(&value).map_err(refuse)?;
         check::document(&value, container.binary.is_some(), &mut warnings).map_err(refuse)?;
         let mut raw = serde_json::Map::new();
-        for name in ["materials", "textures", "samplers", "images"] {
+        for name in LOOSELY_READ {
             raw.insert(name.into(), value.get(name).cloned().unwrap_or_default());
         }
         let animations = animation::declared(&value, &mut warnings);
@@ -159,31 +178,30 @@ impl<'a> Document<'a> {
             spent: Cell::new(0),
             most_numbers: accessor::MOST_NUMBERS,
             unconverted: Vec::new(),
-            raw: Value::Object(raw),
+            raw: Rc::new(Value::Object(raw)),
         })
     }
 
     /// Loads all buffers and decompresses what is compressed.
     fn load(&mut self, binary: Option<&[u8]>, folder: Option<&'a Path>) {
         self.folder = folder;
-        self.buffers = buffers::load(&self.root, binary, folder, &mut self.warnings);
-        self.decompressed = meshopt::decompress(&self.root, &self.buffers, &mut self.warnings);
-    }
-
-    /// A list of the document as it is in the file.
-    fn raw(&self, name: &str) -> Vec<Value> {
-        self.raw.get(name).and_then(Value::as_array).cloned().unwrap_or_default()
+        let most_bytes = self.most_numbers.saturating_mul(4);
+        self.buffers = buffers::load(&self.root, binary, folder, most_bytes, &mut self.warnings);
+        self.decompressed = meshopt::decompress(&self.root, &self.buffers, most_bytes, &mut self.warnings);
     }
 
     /// Number of textures.
     fn root_textures(&self) -> usize {
-        self.raw.get("textures").and_then(Value::as_array).map_or(0, Vec::len)
+        check::list(&self.raw, "textures").len()
     }
 
     fn refuse(&self, message: impl ToString) -> Error {
         Error::content(self.file, message)
     }
 }
+
+/// What is read from the JSON itself, because the `gltf` crate knows too little of it or is too strict.
+const LOOSELY_READ: [&str; 4] = ["materials", "textures", "samplers", "images"];
 
 /// The document in the types of the `gltf` crate; if it is too strict for it, without what is not read from them anyway.
 fn typed(json: &[u8], mut value: Value) -> serde_json::Result<Root> {
@@ -199,16 +217,39 @@ fn typed(json: &[u8], mut value: Value) -> serde_json::Result<Root> {
 #[cfg(test)]
 mod tests;
 
+/// A name, cut off if it is very long: it may be repeated as often as something is in the file.
+fn short(name: &str) -> Cow<'_, str> {
+    const MOST: usize = 200;
+    match name.char_indices().nth(MOST) {
+        Some((end, _)) => Cow::Owned(format!("{}…", &name[..end])),
+        None => Cow::Borrowed(name),
+    }
+}
+
+/// Most texts of warnings: nobody reads more, and each element of a large file could have one of its own.
+const MOST_WARNINGS: usize = 1000;
+
 /// Warnings, each text once with the number of times it was given.
 #[derive(Default)]
 struct Warnings {
     order: Vec<String>,
     counts: BTreeMap<String, usize>,
+    /// Those that came when there were enough.
+    left_out: usize,
+    /// The first that says that something is ignored.
+    ignored: Option<String>,
 }
 
 impl Warnings {
     fn add(&mut self, text: impl Into<String>) {
         let text = text.into();
+        if self.ignored.is_none() && text.starts_with("ignored:") {
+            self.ignored = Some(text.clone());
+        }
+        if self.order.len() >= MOST_WARNINGS && !self.counts.contains_key(&text) {
+            self.left_out += 1;
+            return;
+        }
         let count = self.counts.entry(text.clone()).or_default();
         *count += 1;
         if *count == 1 {
@@ -217,11 +258,12 @@ impl Warnings {
     }
 
     fn into_lines(self) -> Vec<String> {
-        let Self { order, counts } = self;
+        let Self { order, counts, left_out, .. } = self;
         let line = |text: String| match counts.get(&text) {
             Some(count) if *count > 1 => format!("{text} ({count} times)"),
             _ => text,
         };
-        order.into_iter().map(line).collect()
+        let more = (left_out > 0).then(|| format!("and {left_out} more warnings"));
+        order.into_iter().map(line).chain(more).collect()
     }
 }

@@ -9,6 +9,9 @@ use ::gltf::json::{self};
 use glam::{DMat4, DQuat, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
+/// Numbers of four bytes that the transform of an instance takes.
+const PLACE_NUMBERS: u64 = 32;
+
 /// A node's own transform.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Local {
@@ -94,6 +97,9 @@ impl Hierarchy {
 impl Document<'_> {
     /// Reads all nodes and walks those of the chosen scene.
     pub fn hierarchy(&mut self, choice: Option<&str>) -> Result<Hierarchy> {
+        // Many nodes may have one mesh's weights each.
+        let weights = |node: &json::Node| self.weights_of(node).map_or(0, |weights| weights.len() as u64);
+        self.spend_numbers(self.root.nodes.iter().map(|node| 2 * weights(node)).sum())?;
         let mut nodes: Vec<Node> = self.root.nodes.iter().map(|node| self.node(node)).collect();
         for (parent, node) in self.root.nodes.iter().enumerate() {
             node.children.iter().flatten().for_each(|child| nodes[child.value()].parent = Some(parent));
@@ -128,12 +134,17 @@ impl Document<'_> {
         Ok(Hierarchy { nodes, order, members, is_member: visited })
     }
 
+    /// Weights of the morph targets of a node's mesh.
+    fn weights_of<'b>(&'b self, node: &'b json::Node) -> Option<&'b Vec<f32>> {
+        let of_mesh = || self.root.meshes[node.mesh?.value()].weights.as_ref();
+        node.weights.as_ref().or_else(of_mesh)
+    }
+
     fn node(&self, node: &json::Node) -> Node {
         let extensions = node.extensions.as_ref();
         let visibility = extensions.and_then(|extensions| extensions.others.get("KHR_node_visibility"));
         let mesh = node.mesh.map(|mesh| mesh.value());
-        let of_mesh = || mesh.and_then(|mesh| self.root.meshes[mesh].weights.clone());
-        let weights = node.weights.clone().or_else(of_mesh).unwrap_or_default();
+        let weights = self.weights_of(node).into_iter().flatten();
         Node {
             name: node.name.clone().unwrap_or_default(),
             parent: None,
@@ -141,7 +152,7 @@ impl Document<'_> {
             local: Local::of(node),
             mesh,
             skin: node.skin.map(|skin| skin.value()).filter(|_| mesh.is_some()),
-            weights: weights.into_iter().map(f64::from).collect(),
+            weights: weights.copied().map(f64::from).collect(),
             camera: node.camera.map(|camera| camera.value()),
             light: extensions
                 .and_then(|extensions| extensions.khr_lights_punctual.as_ref())
@@ -216,6 +227,8 @@ impl Document<'_> {
         let vector = |values: &Option<Vec<f32>>, i: usize, default: DVec3| {
             values.as_ref().map_or(default, |values| glam::Vec3::from_slice(&values[3 * i..]).as_dvec3())
         };
+        // What is made of them takes more than they do.
+        self.spend_numbers(count.unwrap_or(0) as u64 * PLACE_NUMBERS)?;
         let transform = |i: usize| {
             let rotation = rotations
                 .as_ref()

@@ -158,6 +158,8 @@ impl Document<'_> {
         let pair = |set| accessor(Semantic::Joints(set)).zip(accessor(Semantic::Weights(set)));
         let pairs: Vec<(usize, usize)> = (0..).map_while(pair).collect();
         let per_vertex = 4 * pairs.len();
+        // Before they are there: the pairs may be many, and their accessors short.
+        self.spend_numbers(2 * per_vertex as u64 * count as u64)?;
         let mut influences =
             Influences { per_vertex, joints: vec![0; per_vertex * count], weights: vec![0.0; per_vertex * count] };
         for (set, (joints, weights)) in pairs.into_iter().enumerate() {

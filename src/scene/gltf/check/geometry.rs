@@ -2,7 +2,7 @@
 
 use super::{list, number, selected, Warnings};
 use serde_json::{Map, Value};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) fn buffers(root: &Value, has_binary: bool, warnings: &mut Warnings) {
     if has_binary && list(root, "buffers").first().is_none_or(|first| first.get("uri").is_some()) {
@@ -25,6 +25,9 @@ pub(super) fn buffers(root: &Value, has_binary: bool, warnings: &mut Warnings) {
         }
         if stride > number(view, "byteLength") {
             warnings.add(format!("bufferViews[{index}].byteStride is greater than its byteLength"));
+        }
+        if number(view, "byteLength") == Some(0.0) {
+            warnings.add(format!("bufferViews[{index}].byteLength is 0"));
         }
         let buffer =
             view.get("buffer").and_then(Value::as_u64).and_then(|buffer| list(root, "buffers").get(buffer as usize));
@@ -167,7 +170,15 @@ pub(super) fn meshes(root: &Value, warnings: &mut Warnings) -> Result<(), String
             }
         }
         morph_targets(&path, primitive, attributes, &accessor, warnings);
+        for (index, target) in list(primitive, "targets").iter().enumerate() {
+            for (name, value) in target.as_object().into_iter().flatten() {
+                if is_for_indices(root, accessor(value)) {
+                    warnings.add(format!("{path}.targets[{index}].{name}: its bufferView is meant for indices"));
+                }
+            }
+        }
     }
+    mixed_views(root, warnings);
     mesh_weights(root, warnings);
     Ok(())
 }
@@ -209,20 +220,26 @@ fn attribute_format(
     }
     let view_index = accessor.get("bufferView").and_then(Value::as_u64);
     let view = view_index.and_then(|view| list(root, "bufferViews").get(view as usize));
-    if view.and_then(|view| view.get("target")?.as_u64()) == Some(34963) {
+    if is_for_indices(root, Some(accessor)) {
         warnings.add(format!("{path}.attributes.{name}: its bufferView is meant for indices"));
     }
     let Some((component, components)) = sizes(accessor) else { return };
     let stride = view.and_then(|view| number(view, "byteStride"));
-    if stride.unwrap_or((component * components) as f64) % 4.0 != 0.0
-        || number(accessor, "byteOffset").unwrap_or(0.0) % 4.0 != 0.0
-    {
+    let offset = number(accessor, "byteOffset").unwrap_or(0.0);
+    if view.is_some() && (stride.unwrap_or((component * components) as f64) % 4.0 != 0.0 || offset % 4.0 != 0.0) {
         warnings.add(format!("{path}.attributes.{name}: vertices are not aligned to 4 bytes"));
     }
     if stride.is_none() && view_index.is_some_and(|view| users.get(&view) > Some(&1)) {
         warnings
             .add(format!("{path}.attributes.{name}: its bufferView serves several accessors and has no byteStride"));
     }
+}
+
+/// The buffer view of an accessor is declared to hold indices.
+fn is_for_indices(root: &Value, accessor: Option<&Value>) -> bool {
+    let view = accessor.and_then(|accessor| accessor.get("bufferView")?.as_u64());
+    let view = view.and_then(|view| list(root, "bufferViews").get(view as usize));
+    view.and_then(|view| view.get("target")?.as_u64()) == Some(34963)
 }
 
 fn morph_targets<'a>(
@@ -250,6 +267,19 @@ fn morph_targets<'a>(
                 warnings.add(format!("{path}.targets[{index}].POSITION: its accessor has no min and max"));
             }
         }
+    }
+}
+
+/// A buffer view holds indices or vertices.
+fn mixed_views(root: &Value, warnings: &mut Warnings) {
+    let accessors = list(root, "accessors");
+    let views = |pattern: &str| -> BTreeSet<u64> {
+        let all = selected(root, pattern).into_iter();
+        all.filter_map(|(_, value)| accessors.get(value.as_u64()? as usize)?.get("bufferView")?.as_u64()).collect()
+    };
+    let (indices, vertices) = (views("meshes.*.primitives.*.indices"), views("meshes.*.primitives.*.attributes.*"));
+    for view in indices.intersection(&vertices) {
+        warnings.add(format!("bufferViews[{view}] holds both indices and vertices"));
     }
 }
 

@@ -3,13 +3,16 @@
 //! A fault in what is drawn (buffers, accessors, meshes, nodes, scenes) that leaves its meaning open refuses the file;
 //! any other is a warning.
 
+mod animations;
 mod geometry;
 mod motion;
 mod nodes;
+mod surfaces;
 
-use super::{standing, Warnings};
+use super::{short, standing, Warnings};
 use crate::scene::Standing;
 use serde_json::{Map, Value};
+use std::collections::BTreeSet;
 
 /// `Err` unless `asset.version` is 2.x and `minVersion` is 2.0 at most.
 pub(super) fn version(root: &Value) -> Result<(), String> {
@@ -37,7 +40,10 @@ pub(super) fn required_extensions(root: &Value) -> Result<(), String> {
     if missing.is_empty() {
         return Ok(());
     }
-    Err(format!("it requires {}, which glimt does not support", missing.join(" and ")))
+    let used: BTreeSet<&str> = list(root, "extensionsUsed").iter().filter_map(Value::as_str).collect();
+    let undeclared = missing.iter().any(|name| !used.contains(name));
+    let undeclared = if undeclared { "; nor does extensionsUsed name it" } else { "" };
+    Err(format!("it requires {}, which glimt does not support{undeclared}", missing.join(" and ")))
 }
 
 /// Everything else. `Err` names the first fault that refuses the file.
@@ -51,11 +57,13 @@ pub(super) fn document(root: &Value, has_binary: bool, warnings: &mut Warnings) 
     geometry::meshes(root, warnings)?;
     nodes::nodes(root, warnings)?;
     nodes::cameras_and_lights(root, warnings);
-    nodes::skins_and_animations(root, warnings);
+    animations::skins(root, warnings);
+    animations::animations(root, warnings);
     motion::skeletons(root, warnings);
     motion::variants(root, warnings);
-    nodes::materials(root, warnings);
-    nodes::images(root, warnings);
+    surfaces::materials(root, warnings);
+    surfaces::needs(root, warnings);
+    surfaces::images(root, warnings);
     Ok(())
 }
 
@@ -69,7 +77,7 @@ fn select<'a>(root: &'a Value, pattern: &str, visit: &mut dyn FnMut(&str, &'a Va
                 items.iter().enumerate().for_each(|(i, item)| walk(item, &format!("{path}[{i}]"), rest, visit));
             }
             ("*", Value::Object(items)) => {
-                items.iter().for_each(|(key, item)| walk(item, &format!("{path}.{key}"), rest, visit));
+                items.iter().for_each(|(key, item)| walk(item, &format!("{path}.{}", short(key)), rest, visit));
             }
             (name, _) => {
                 let dot = if path.is_empty() { "" } else { "." };
@@ -88,7 +96,7 @@ fn selected<'a>(root: &'a Value, pattern: &str) -> Vec<(String, &'a Value)> {
     all
 }
 
-fn list<'a>(root: &'a Value, name: &str) -> &'a [Value] {
+pub(super) fn list<'a>(root: &'a Value, name: &str) -> &'a [Value] {
     root.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
@@ -96,7 +104,7 @@ fn number(value: &Value, name: &str) -> Option<f64> {
     value.get(name).and_then(Value::as_f64)
 }
 
-/// `Err` names a top-level collection that is no array.
+/// `Err` names a top-level collection that is no array, or an element of one that is no object.
 fn collections(root: &Value) -> Result<(), String> {
     let names = [
         "accessors",
@@ -116,7 +124,15 @@ fn collections(root: &Value) -> Result<(), String> {
         "textures",
     ];
     let wrong = names.iter().find(|name| root.get(**name).is_some_and(|value| !value.is_array()));
-    wrong.map_or(Ok(()), |name| Err(format!("{name} is not an array")))
+    if let Some(name) = wrong {
+        return Err(format!("{name} is not an array"));
+    }
+    let elements = names
+        .iter()
+        .filter(|name| !name.starts_with("extensions"))
+        .flat_map(|name| list(root, name).iter().enumerate().map(move |(index, element)| (name, index, element)));
+    let mut wrong = elements.filter(|(_, _, element)| !element.is_object());
+    wrong.next().map_or(Ok(()), |(name, index, _)| Err(format!("{name}[{index}] is not an object")))
 }
 
 /// What refers to what: pattern, list that it indexes, and whether a dangling one refuses the file.
@@ -225,44 +241,49 @@ fn empty_entities(root: &Value, warnings: &mut Warnings) {
 
 /// Extensions used somewhere must be declared, those required must be used, and objects must be where they belong.
 fn extensions(root: &Value, warnings: &mut Warnings) {
-    let names = |key: &str| -> Vec<&str> { list(root, key).iter().filter_map(Value::as_str).collect() };
-    let (used, required) = (names("extensionsUsed"), names("extensionsRequired"));
-    for name in &required {
-        if !used.contains(name) {
-            warnings.add(format!("extensionsRequired names {name}, extensionsUsed does not"));
-        }
-    }
-    for (index, name) in used.iter().enumerate() {
-        if used[..index].contains(name) {
+    let names = |key: &'static str| list(root, key).iter().filter_map(Value::as_str);
+    let required: BTreeSet<&str> = names("extensionsRequired").collect();
+    let mut used = BTreeSet::new();
+    for name in names("extensionsUsed") {
+        if !used.insert(name) {
             warnings.add(format!("extensionsUsed names {name} twice"));
         }
+    }
+    for name in required.difference(&used) {
+        warnings.add(format!("extensionsRequired names {name}, extensionsUsed does not"));
     }
     if used.contains(&"KHR_mesh_quantization") && !required.contains(&"KHR_mesh_quantization") {
         warnings.add("KHR_mesh_quantization is used but not required");
     }
     // Where each extension's object may stand: the last list or object on the way to it.
-    let places: [(&str, &[&str]); 4] = [
+    let places: [(&str, &[&str]); 8] = [
+        ("EXT_texture_webp", &["textures"]),
+        ("KHR_animation_pointer", &["target"]),
         ("KHR_lights_punctual", &["", "nodes"]),
+        ("KHR_mesh_quantization", &[]),
         ("KHR_node_visibility", &["nodes"]),
+        ("KHR_texture_basisu", &["textures"]),
         ("KHR_texture_transform", &["Texture"]),
         ("KHR_materials_variants", &["", "primitives"]),
     ];
     walk_extensions(root, "", &mut |path, name, value| {
+        let path = if path.is_empty() { String::new() } else { format!("{path}.") };
         if !used.contains(&name) {
-            warnings.add(format!("{path}.extensions.{name}: extensionsUsed does not name it"));
+            warnings.add(format!("{path}extensions.{name}: extensionsUsed does not name it"));
+        }
+        if !value.is_object() {
+            warnings.add(format!("{path}extensions.{name} is not an object"));
         }
         let allowed = match places.iter().find(|(own, _)| *own == name) {
             Some((_, allowed)) => *allowed,
             None if name.starts_with("KHR_materials_") => &["materials"],
             None => return,
         };
-        let holder = path.trim_end_matches(|c: char| c == ']' || c.is_ascii_digit()).trim_end_matches('[');
+        let holder =
+            path.trim_end_matches('.').trim_end_matches(|c: char| c == ']' || c.is_ascii_digit()).trim_end_matches('[');
         let fits = allowed.iter().any(|end| if end.is_empty() { path.is_empty() } else { holder.ends_with(end) });
         if !fits {
-            warnings.add(format!("{path}.extensions.{name} does not belong there"));
-        }
-        if !value.is_object() {
-            warnings.add(format!("{path}.extensions.{name} is not an object"));
+            warnings.add(format!("{path}extensions.{name} does not belong there"));
         }
     });
 }
@@ -279,7 +300,7 @@ fn walk_extensions<'a>(value: &'a Value, path: &str, visit: &mut dyn FnMut(&str,
                 }
                 if key != "extras" {
                     let dot = if path.is_empty() { "" } else { "." };
-                    walk_extensions(member, &format!("{path}{dot}{key}"), visit);
+                    walk_extensions(member, &format!("{path}{dot}{}", short(key)), visit);
                 }
             }
         }

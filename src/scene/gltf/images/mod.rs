@@ -1,35 +1,18 @@
 //! glTF images → [`Image`]: where their bytes lie, and their formats.
 
+mod header;
 mod ktx2;
+mod source;
 
-use super::{buffers, Document};
+pub(super) use header::Header;
+pub(super) use source::other_type;
+
 use crate::scene::{Image, Pixels};
 use ::image::{ColorType, ImageDecoder, ImageFormat, ImageReader, Limits};
-use std::borrow::Cow;
 use std::io::Cursor;
 
 /// Memory that a decoder may take beside its picture.
 const DECODER_BYTES: u64 = 1 << 28;
-
-impl Document<'_> {
-    /// The bytes of image `index`, as its file has them.
-    pub(super) fn image_bytes(&self, index: usize) -> Result<Cow<'_, [u8]>, String> {
-        let image = self.root.images.get(index).ok_or_else(|| format!("there is no images[{index}]"))?;
-        let bytes = match (&image.buffer_view, &image.uri) {
-            (Some(view), _) => self.view_bytes(view.value()).map(Cow::Borrowed),
-            (None, Some(uri)) => buffers::from_uri(uri, self.folder).map(Cow::Owned),
-            (None, None) => Err("it has neither a bufferView nor a uri".into()),
-        };
-        bytes.map_err(|fault| format!("images[{index}]: {fault}"))
-    }
-
-    /// The media type that the document says image `index` has.
-    pub(super) fn image_media_type(&self, index: usize) -> Option<&str> {
-        let image = self.root.images.get(index)?;
-        let in_uri = || image.uri.as_deref()?.strip_prefix("data:")?.split([';', ',']).next();
-        image.mime_type.as_ref().map(|kind| kind.0.as_str()).or_else(in_uri)
-    }
-}
 
 /// Decodes a picture of at most `most_pixels`, checked before anything is decoded. Its format is what its first bytes say; the
 /// second part of the answer is a warning when that is not its `media_type`. Its name is left empty.
@@ -39,20 +22,14 @@ pub(super) fn decode(
     most_pixels: u64,
 ) -> Result<(Image, Option<String>), String> {
     let ordinary = |format: ImageFormat, name: &str| decode_ordinary(bytes, format, name, most_pixels);
-    let (own_type, image) = match bytes {
-        [0x89, b'P', b'N', b'G', ..] => ("image/png", guarded(|| ordinary(ImageFormat::Png, "PNG"))),
-        [0xff, 0xd8, 0xff, ..] => ("image/jpeg", guarded(|| ordinary(ImageFormat::Jpeg, "JPEG"))),
-        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => {
-            ("image/webp", guarded(|| ordinary(ImageFormat::WebP, "WebP")))
-        }
-        [0xab, b'K', b'T', b'X', b' ', b'2', b'0', 0xbb, ..] => {
-            ("image/ktx2", guarded(|| ktx2::decode(bytes, most_pixels)))
-        }
-        _ => return Err("it is none of PNG, JPEG, WebP and KTX2".into()),
-    };
-    let image = image?;
-    let other = media_type.filter(|declared| !declared.eq_ignore_ascii_case(own_type));
-    Ok((image, other.map(|declared| format!("it is {own_type}, but declared as {declared}"))))
+    let own_type = header::media_type(bytes)?;
+    let image = guarded(|| match own_type {
+        "image/png" => ordinary(ImageFormat::Png, "PNG"),
+        "image/jpeg" => ordinary(ImageFormat::Jpeg, "JPEG"),
+        "image/webp" => ordinary(ImageFormat::WebP, "WebP"),
+        _ => ktx2::decode(bytes, most_pixels),
+    })?;
+    Ok((image, media_type.and_then(|declared| other_type(declared, own_type))))
 }
 
 /// Runs a decoder. Another's code at work on what anybody may have written: should it panic, that is one more fault of the

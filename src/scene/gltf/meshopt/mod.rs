@@ -19,8 +19,6 @@ use std::collections::BTreeMap;
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 /// Most bytes that a byte of compressed data can stand for: 256 elements of 4 bytes are a byte if all are alike.
 const MOST_FROM_A_BYTE: usize = 1024;
-/// Most bytes that all views of a document are decompressed to: many views may name the same data.
-const MOST_BYTES: usize = 1 << 31;
 
 /// What the extension says of a buffer view.
 #[derive(Deserialize)]
@@ -48,11 +46,15 @@ enum Mode {
 /// The bytes of every compressed view by its index, or why there are none.
 pub(super) type Decompressed = BTreeMap<usize, Result<Vec<u8>, String>>;
 
-/// Decompresses every view that is compressed. One that cannot be had refuses the file only when something that is drawn
+/// Decompresses every view that is compressed, all together to `left` bytes at most: many may name the same data. One that cannot be had refuses the file only when something that is drawn
 /// needs it.
-pub(super) fn decompress(root: &Root, buffers: &[Result<Vec<u8>, String>], warnings: &mut Warnings) -> Decompressed {
+pub(super) fn decompress(
+    root: &Root,
+    buffers: &[Result<Vec<u8>, String>],
+    mut left: u64,
+    warnings: &mut Warnings,
+) -> Decompressed {
     let mut decompressed = Decompressed::new();
-    let mut left = MOST_BYTES;
     for (index, view) in root.buffer_views.iter().enumerate() {
         let Some((name, extension)) = view.extensions.as_ref().and_then(|all| own(&all.others)) else { continue };
         let bytes = decompress_one(extension, buffers, &mut left);
@@ -95,7 +97,7 @@ fn own(others: &Map<String, Value>) -> Option<(&'static str, &Value)> {
     NAMES.into_iter().find_map(|name| others.get(name).map(|value| (name, value)))
 }
 
-fn decompress_one(extension: &Value, buffers: &[Result<Vec<u8>, String>], left: &mut usize) -> Result<Vec<u8>, String> {
+fn decompress_one(extension: &Value, buffers: &[Result<Vec<u8>, String>], left: &mut u64) -> Result<Vec<u8>, String> {
     let view = Compressed::deserialize(extension).map_err(|error| error.to_string())?;
     let bytes = buffers::slice(buffers, view.buffer, view.byte_offset, view.byte_length)?;
     let (count, stride) = (view.count, view.byte_stride);
@@ -109,7 +111,7 @@ fn decompress_one(extension: &Value, buffers: &[Result<Vec<u8>, String>], left: 
     }
     let size = count.checked_mul(stride).filter(|size| *size <= bytes.len().saturating_mul(MOST_FROM_A_BYTE));
     let size = size.ok_or_else(|| format!("{count} elements cannot come from {} bytes", bytes.len()))?;
-    *left = left.checked_sub(size).ok_or("all compressed data together have more than 2 GiB")?;
+    *left = left.checked_sub(size as u64).ok_or("it takes more memory than is left (see --max-memory)")?;
     match view.mode {
         Mode::Attributes => {
             let mut decoded = attributes::decode(bytes, count, stride)?;

@@ -84,9 +84,9 @@ fn sizes_are_checked_before_decoding() {
     let buffers = [Ok(bytes_of(TRIANGLE[1]))];
     let mut view =
         serde_json::json!({"buffer": 0, "byteLength": 34, "byteStride": 12, "count": 3, "mode": "ATTRIBUTES"});
-    let decompress = |view: &Value, left: usize| decompress_one(view, &buffers, &mut { left });
+    let decompress = |view: &Value, left: u64| decompress_one(view, &buffers, &mut { left });
     assert_eq!(decompress(&view, 36).map(|bytes| bytes.len()), Ok(36));
-    assert!(decompress(&view, 35).unwrap_err().contains("more than 2 GiB"));
+    assert!(decompress(&view, 35).unwrap_err().contains("more memory than is left"));
     for (name, value, fault) in [
         ("count", serde_json::json!(3000), "cannot come from 34 bytes"),
         ("count", serde_json::json!(u64::MAX), "cannot come from 34 bytes"),
