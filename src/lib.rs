@@ -11,7 +11,7 @@
 //!
 //! # The data's path
 //! ```text
-//! scene.glb ─scene::gltf→ Asset ─ a time → Scene
+//! scene.glb ─scene::gltf→ Asset (meshes, materials, decoded pictures) ─ a time → Scene
 //! Scene ─┬─ Soup ─bvh→ Tree (one, or one a shared mesh and one over instances) ─ quantised records ─┐
 //!        ├─ View (camera, lights, size)                                      render::upload → device buffers
 //!        └─ Features → specialization constants, passes, buffers (render::Plan)

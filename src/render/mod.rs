@@ -237,7 +237,7 @@ impl Renderer {
         progressive::check(options)?;
         self.device.forget_peak_memory();
         let start = Instant::now();
-        let textures = textures::Textures::of(scene, features.textures)?;
+        let textures = textures::Textures::of(scene, features.textures, self.device.fetch_limit())?;
         let plan = Plan::with_textures(prepared, scene, features, tree.size(), in_flight, &textures);
         let device_tree = tree.for_device(soup, view.camera.eye);
         let on_device =
@@ -258,11 +258,17 @@ impl Renderer {
         if !messages.is_empty() {
             return Err(Error::Validation(messages));
         }
+        let mut scene_report = describe(scene, soup, view);
+        if textures.halved > 0 {
+            let (times, device) = (textures.halved, &self.device.info.name);
+            let why = format!("{device} can bind no more than {} bytes at once", self.device.fetch_limit());
+            scene_report.warnings.push(format!("approximated: textures were halved {times} times: {why}"));
+        }
         let report = Report {
             frame: None,
             image: report::Image { width: view.width, height: view.height, ..Default::default() },
             device: describe_device(&self.device),
-            scene: describe(scene, soup, view),
+            scene: scene_report,
             features: features.needs().collect(),
             passes: outcome.passes,
             rays: outcome.rays,

@@ -77,7 +77,7 @@ impl Plan {
     /// # Errors
     /// `Content` when its textures are too large.
     pub fn new(prepared: &Prepared, scene: &Scene, features: Features, tree: TreeSize, in_flight: u32) -> Result<Self> {
-        let textures = Textures::of(scene, features.textures)?;
+        let textures = Textures::of(scene, features.textures, u64::MAX)?;
         Ok(Self::with_textures(prepared, scene, features, tree, in_flight, &textures))
     }
 

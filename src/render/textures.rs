@@ -7,7 +7,8 @@ use crate::layout::{
 };
 use crate::scene::{self, Map, Mipmaps, Pixels, Scene, UsedMap, Wrap};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Levels that a record has room for.
 const MOST_LEVELS: usize = 16;
@@ -22,17 +23,20 @@ pub(super) struct Textures {
     pub records: Vec<Texture>,
     /// Levels of pictures, each from a whole texel on.
     pub pixels: Vec<[u32; 4]>,
+    /// How often a picture was halved because the device cannot bind all of them.
+    pub halved: usize,
 }
 
 /// A picture in the form in which some textures need it: which, in sRGB or not, with a mipmap or not.
 type Form = (usize, bool, bool);
 
 impl Textures {
-    /// Textures of visible materials; nothing where the scene is drawn without.
+    /// Textures of visible materials, in at most so many bytes: the largest pictures are halved until they fit. Nothing where the scene
+    /// is drawn without.
     ///
     /// # Errors
     /// `Content` when their pixels are more than a device can address.
-    pub fn of(scene: &Scene, is_needed: bool) -> Result<Self> {
+    pub fn of(scene: &Scene, is_needed: bool, most_bytes: u64) -> Result<Self> {
         let mut textures = Self::default();
         if !is_needed {
             return Ok(textures);
@@ -50,15 +54,16 @@ impl Textures {
             let texture = &scene.textures[used.map.texture];
             (texture.image, used.is_srgb, texture.minify.mipmap.is_some())
         };
-        let forms: BTreeMap<Form, ()> = textures.used.iter().map(|used| (form(used), ())).collect();
-        let made: Vec<(Form, Mipmaps)> = forms
+        let forms: BTreeSet<Form> = textures.used.iter().map(form).collect();
+        let mut made: Vec<(Form, Mipmaps)> = forms
             .into_par_iter()
-            .filter_map(|(form, ())| {
+            .filter_map(|form| {
                 let (image, is_srgb, has_mipmap) = form;
                 let image = scene.images[image].as_ref()?;
                 Some((form, if has_mipmap { Mipmaps::of(image, is_srgb) } else { Mipmaps::whole(image) }))
             })
             .collect();
+        textures.halved = fit(scene, &mut made, most_bytes);
         let mut placed = BTreeMap::new();
         for (form, mipmaps) in made {
             placed.insert(form, textures.place(&mipmaps));
@@ -113,6 +118,38 @@ impl Textures {
     }
 }
 
+/// Bytes of a level on the device.
+fn level_bytes((width, height, pixels): &(u32, u32, Cow<Pixels>)) -> u64 {
+    let pixels_in_texel = if matches!(pixels.as_ref(), Pixels::Rgba16(_)) { 2 } else { 4 };
+    (u64::from(*width) * u64::from(*height)).div_ceil(pixels_in_texel) * TEXEL as u64
+}
+
+/// Halves the largest pictures until all fit; answers how often.
+fn fit<'a>(scene: &'a Scene, made: &mut [(Form, Mipmaps<'a>)], most_bytes: u64) -> usize {
+    let mut halved = 0;
+    loop {
+        let bytes: u64 = made.iter().flat_map(|(_, mipmaps)| &mipmaps.levels).map(level_bytes).sum();
+        let largest = made.iter_mut().max_by_key(|(_, mipmaps)| level_bytes(&mipmaps.levels[0]));
+        let Some(((image, is_srgb, has_mipmap), mipmaps)) = largest.filter(|_| bytes > most_bytes) else {
+            return halved;
+        };
+        if !*has_mipmap {
+            if let Some(image) = &scene.images[*image] {
+                let first = (mipmaps.levels[0].0, mipmaps.levels[0].1);
+                let mut all = Mipmaps::of(image, *is_srgb);
+                let next = all.levels.iter().position(|level| level.0 < first.0 || level.1 < first.1);
+                let Some(next) = next else { return halved };
+                mipmaps.levels = vec![all.levels.swap_remove(next)];
+            }
+        } else if mipmaps.levels.len() > 1 {
+            mipmaps.levels.remove(0);
+        } else {
+            return halved;
+        }
+        halved += 1;
+    }
+}
+
 fn record(texture: &scene::Texture, used: &UsedMap, firsts: &[u32], size: (u32, u32), is_wide: bool) -> Texture {
     let wrap = |wrap: Wrap| match wrap {
         Wrap::Repeat => 0,
@@ -144,5 +181,46 @@ fn record(texture: &scene::Texture, used: &UsedMap, firsts: &[u32], size: (u32, 
         levels_from_12: level(12),
         unused_u: 0,
         unused_v: 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Image, Maps, Material, Mesh};
+    use std::sync::Arc;
+
+    /// Pictures of these sides, each the base colour of a material.
+    fn scene_of(sides: &[u32], minify: scene::Minify) -> Scene {
+        let mut scene = Scene::default();
+        for (index, side) in sides.iter().enumerate() {
+            let pixels = Pixels::Rgba8(vec![[7; 4]; (side * side) as usize]);
+            let (name, format) = (String::new(), String::new());
+            let image = Image { name, format, width: *side, height: *side, pixels, bytes: 0 };
+            scene.images.push(Some(Arc::new(image)));
+            scene.textures.push(scene::Texture { minify, ..scene::Texture::of(index) });
+            let maps = Maps { base_color: Some(Map::of(index)), ..Maps::default() };
+            scene.materials.push(Material { maps, ..Material::default() });
+            scene.meshes.push(Mesh { material: index, ..Mesh::default() });
+            let world_from_object = glam::DMat4::IDENTITY;
+            scene.instances.push(scene::Instance { mesh: index, world_from_object });
+        }
+        scene
+    }
+
+    #[test]
+    fn the_largest_pictures_are_halved_until_all_fit() {
+        for (mipmap, whole_bytes) in [(None, 4 * (64 * 64 + 16 * 16)), (Some(true), 4 * 64 * 64 * 4 / 3 + 2000)] {
+            let scene = scene_of(&[64, 16], scene::Minify { linear: true, mipmap });
+            let sides = |most: u64| {
+                let textures = Textures::of(&scene, true, most).unwrap();
+                assert!(textures.bytes() <= most, "{} of {most} bytes", textures.bytes());
+                (textures.records.iter().map(|record| record.width).collect::<Vec<_>>(), textures.halved)
+            };
+            assert_eq!(sides(u64::MAX), (vec![64, 16], 0));
+            assert_eq!(sides(whole_bytes), (vec![64, 16], 0));
+            assert_eq!(sides(4 * 64 * 64), (vec![32, 16], 1));
+            assert!(sides(2 * 4 * 16 * 16).1 >= 2);
+        }
     }
 }

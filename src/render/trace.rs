@@ -91,7 +91,7 @@ impl Renderer {
         let moller_trumbore = prepared.features.moller_trumbore;
         let features = Features { shadows: true, reflections: true, moller_trumbore, ..Features::default() };
         let features = tree.features(features);
-        let textures = Textures::of(scene, features.textures)?;
+        let textures = Textures::of(scene, features.textures, self.device.fetch_limit())?;
         let plan = Plan::with_textures(prepared, scene, features, tree.size(), width * height, &textures);
         if plan.waves(1) != 1 {
             return Err(Error::Usage(format!("{width}x{height} rays do not fit into one wave")));

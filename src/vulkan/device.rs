@@ -123,6 +123,14 @@ pub struct MemoryCount {
 }
 
 impl Device {
+    /// Most bytes of a buffer that kernels fetch from.
+    pub fn fetch_limit(&self) -> u64 {
+        match self.fetch {
+            Fetch::Texel => 16 * u64::from(self.info.max_texels),
+            Fetch::Storage => self.info.max_storage_bytes,
+        }
+    }
+
     /// All physical devices, in the loader's order, usable or not.
     ///
     /// # Errors
