@@ -12,7 +12,7 @@ const MOST_LOOSE: f64 = 1.3;
 
 impl Tree {
     /// The trees for the next frame of a sequence: these with new boxes if the soup has as many triangles in each part and no
-    /// part's cost exceeds [`MOST_LOOSE`] times its cost when it was built; otherwise new ones.
+    /// part's cost exceeds 1.3 times its cost when it was built; otherwise new ones.
     pub fn next(&self, soup: &Soup, rebase: Rebase, quality: Quality) -> Self {
         let refitted = self.has_parts_of(soup).then(|| self.refitted(soup, rebase));
         // Of the part that has become loosest.
