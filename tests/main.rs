@@ -5,6 +5,7 @@
 //! * `bvh` — invariants on random and hostile boxes, determinism
 //! * `scene` — shapes, transforms, cameras, materials
 //! * `gltf` — accessors of every kind, hierarchies, faults, written by the tests themselves
+//! * `account` — what becomes of extensions and pictures, `--strict`, `info`
 //! * `poses` — animations, skins, morph targets against values computed by hand; variants, visibility, sequences
 //! * `frames` — pictures: against the reference, closed forms, determinism, features
 //! * `textures` — samplers, maps, alpha and coloured shadows, against the reference and closed forms
@@ -21,6 +22,7 @@
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
 
+mod account;
 mod architecture;
 mod batch;
 mod broken;
