@@ -16,32 +16,26 @@ Material by_rule(vec3 base, float metallic, float roughness, vec3 dielectric, fl
                     vec3(0.0), vec2(0.0));
 }
 
-/// Applies the maps of a surface's material to its coefficients and tint.
+/// Applies the maps of a surface's material to its coefficients and tint. Maps are read in a loop: one by one, the kernel would be eight times as
+/// long, and be compiled as slowly.
 void apply_maps(uint material_index, inout Surface surface, inout Material material) {
+    const uint BASE_COLOR = 0u, ROUGH_METAL = 1u, OCCLUSION = 2u, EMISSION = 3u, SPECULAR_STRENGTH = 4u;
+    const uint SPECULAR_COLOR = 5u, TRANSMISSION = 6u, MAPS = 7u;
     Look look = look_at(material_index);
-    vec4 base = vec4(1.0);
-    if (look.base_color_map != 0u)
-        base = map_at(look.base_color_map, surface.place);
-    surface.tint *= base.rgb;
-    if (look.emission_map != 0u)
-        material.emission *= map_at(look.emission_map, surface.place).rgb;
+    uint maps[MAPS] = uint[](look.base_color_map, look.metallic_roughness_map, look.occlusion_map, look.emission_map,
+                             look.specular_map, look.specular_color_map, look.transmission_map);
+    vec4 values[MAPS];
+    [[dont_unroll]] for (uint i = 0u; i < MAPS; i++)
+        values[i] = maps[i] != 0u ? map_at(maps[i], surface.place) : vec4(1.0);
+    surface.tint *= values[BASE_COLOR].rgb;
+    material.emission *= values[EMISSION].rgb;
     uint deep = look.metallic_roughness_map | look.specular_map | look.specular_color_map | look.transmission_map;
     if (deep != 0u && look.follows_rule != 0u) {
-        vec4 rough_metal = vec4(1.0);
-        vec3 dielectric = look.dielectric;
-        float transmission = look.transmission;
-        if (look.metallic_roughness_map != 0u)
-            rough_metal = map_at(look.metallic_roughness_map, surface.place);
-        if (look.specular_map != 0u)
-            dielectric *= map_at(look.specular_map, surface.place).a;
-        if (look.specular_color_map != 0u)
-            dielectric *= map_at(look.specular_color_map, surface.place).rgb;
-        if (look.transmission_map != 0u)
-            transmission *= map_at(look.transmission_map, surface.place).r;
-        material = by_rule(look.base_color * surface.tint, look.metallic * rough_metal.b, look.roughness * rough_metal.g,
-                           dielectric, transmission, material.emission);
+        vec3 dielectric = look.dielectric * values[SPECULAR_STRENGTH].a * values[SPECULAR_COLOR].rgb;
+        material = by_rule(look.base_color * surface.tint, look.metallic * values[ROUGH_METAL].b,
+                           look.roughness * values[ROUGH_METAL].g, dielectric,
+                           look.transmission * values[TRANSMISSION].r, material.emission);
         surface.tint = vec3(1.0);
     }
-    if (look.occlusion_map != 0u)
-        material.ambient_tinted *= 1.0 + look.occlusion_strength * (map_at(look.occlusion_map, surface.place).r - 1.0);
+    material.ambient_tinted *= 1.0 + look.occlusion_strength * (values[OCCLUSION].r - 1.0);
 }

@@ -67,20 +67,24 @@ vec4 read_level(Level level, vec2 at, bool linear) {
     return mix(upper, lower, weight.y);
 }
 
-/// A texture at a point where its pixels are 2^lod times as small as what the ray covers.
+/// A texture at a point where its pixels are 2^lod times as small as what the ray covers: from one level or between two. Written as a loop, which
+/// is compiled once, because all of it is repeated for every map that a kernel reads.
 vec4 read_texture(uint first, uvec4 header, vec2 at, float lod) {
-    if (lod <= 0.0)
-        return read_level(level_of(first, header, 0u), at, (header.w & TEXTURE_MAGNIFY_NEAREST) == 0u);
-    bool linear = (header.w & TEXTURE_MINIFY_NEAREST) == 0u;
-    if ((header.w & TEXTURE_MIPMAP) == 0u)
-        return read_level(level_of(first, header, 0u), at, linear);
-    lod = min(lod, float(header.z - 1u));
-    if ((header.w & TEXTURE_LEVEL_NEAREST) != 0u)
-        return read_level(level_of(first, header, uint(max(ceil(lod + 0.5) - 1.0, 0.0))), at, linear);
-    float finer = floor(lod);
-    vec4 fine = read_level(level_of(first, header, uint(finer)), at, linear);
-    vec4 coarse = read_level(level_of(first, header, min(uint(finer) + 1u, header.z - 1u)), at, linear);
-    return mix(fine, coarse, lod - finer);
+    bool is_large = lod <= 0.0;
+    bool linear = (header.w & (is_large ? TEXTURE_MAGNIFY_NEAREST : TEXTURE_MINIFY_NEAREST)) == 0u;
+    bool has_levels = !is_large && (header.w & TEXTURE_MIPMAP) != 0u;
+    bool is_nearest = (header.w & TEXTURE_LEVEL_NEAREST) != 0u;
+    float last = float(header.z - 1u);
+    float level = has_levels ? min(lod, last) : 0.0;
+    level = has_levels && is_nearest ? max(ceil(level + 0.5) - 1.0, 0.0) : level;
+    float finer = floor(level);
+    vec4 sum = vec4(0.0);
+    uint levels = level > finer ? 2u : 1u;
+    for (uint i = 0u; i < levels; i++) {
+        float weight = i == 0u ? 1.0 - (level - finer) : level - finer;
+        sum += weight * read_level(level_of(first, header, uint(finer) + i), at, linear);
+    }
+    return sum;
 }
 
 /// The value of a map, named by one more than its place among the textures: the mean of probes along the longer axis of the footprint, each as
