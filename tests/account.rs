@@ -1,7 +1,7 @@
 //! What a file is said to be shown of: extensions, pictures, `--strict`.
 
 use super::cli::{run, text};
-use super::gltf::{Builder, TRIANGLE};
+use super::documents::{Builder, TRIANGLE};
 use glimt::scene::{gltf, Pixels, Standing};
 use glimt::Error;
 use serde_json::{json, Value};

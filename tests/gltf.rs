@@ -1,74 +1,15 @@
 //! The glTF reader, on files that the tests write themselves.
 
-use glam::{DVec3, Vec3, Vec4};
+use super::documents::{message, read, Builder, TRIANGLE};
+use glam::{DVec3, Vec3};
 use glimt::scene::{gltf, LightKind, Projection};
 use glimt::{Result, Scene};
 use serde_json::{json, Value};
-
-/// A document under construction: accessors over one buffer.
-#[derive(Default)]
-pub struct Builder {
-    bytes: Vec<u8>,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
-}
-
-impl Builder {
-    pub fn view(&mut self, bytes: &[u8], stride: Option<usize>) -> usize {
-        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let mut view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
-        if let Some(stride) = stride {
-            view["byteStride"] = stride.into();
-        }
-        self.bytes.extend(bytes);
-        self.views.push(view);
-        self.views.len() - 1
-    }
-
-    pub fn accessor(&mut self, accessor: Value) -> usize {
-        self.accessors.push(accessor);
-        self.accessors.len() - 1
-    }
-
-    pub fn floats(&mut self, shape: &str, values: &[f32]) -> usize {
-        let components =
-            [("SCALAR", 1), ("VEC3", 3), ("VEC4", 4), ("MAT4", 16)].iter().find(|own| own.0 == shape).unwrap().1;
-        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        let view = self.view(&bytes, None);
-        let count = values.len() / components;
-        self.accessor(json!({"bufferView": view, "componentType": 5126, "type": shape, "count": count}))
-    }
-
-    /// A document with one node for one mesh of one primitive; `more` overrides top-level members.
-    pub fn document(&self, primitive: Value, more: Value) -> Value {
-        use base64::Engine;
-        let data = base64::engine::general_purpose::STANDARD.encode(&self.bytes);
-        let mut document = json!({
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [primitive]}], "accessors": self.accessors, "bufferViews": self.views,
-            "buffers": [{"byteLength": self.bytes.len(), "uri": format!("data:application/octet-stream;base64,{data}")}],
-        });
-        more.as_object().unwrap().iter().for_each(|(key, value)| document[key] = value.clone());
-        document
-    }
-}
-
-fn read(document: &Value) -> Result<Scene> {
-    gltf::parse(document.to_string().as_bytes(), "test".into(), "test.gltf", None, &gltf::ReadOptions::default())
-}
-
-pub const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 fn triangle(more: Value) -> Result<Scene> {
     let mut builder = Builder::default();
     let positions = builder.floats("VEC3", &TRIANGLE);
     read(&builder.document(json!({"attributes": {"POSITION": positions}}), more))
-}
-
-pub fn message(result: Result<Scene>) -> String {
-    let Err(error) = result else { panic!("must be refused") };
-    assert_eq!(error.exit_code(), 2, "{error}");
-    error.to_string()
 }
 
 #[test]
@@ -377,72 +318,4 @@ fn unlit_is_the_base_color_alone() {
         "materials": [{"emissiveFactor": [0, 1, 0], "extensions": {"KHR_materials_unlit": {}}}]});
     let scene = read(&builder.document(json!({"attributes": {"POSITION": positions}, "material": 0}), more)).unwrap();
     assert!(scene.materials[0].unlit && scene.materials[0].emission == DVec3::ZERO);
-}
-
-/// A view of three positions, compressed by meshopt.
-pub const MESHOPT: &str = "oerqqgB/fwAAfwAAAAAAAAAAAAAAAAAAAAAAAAAAABIBAA==";
-
-#[test]
-fn compressed_views_replace_the_fallback() {
-    for (name, fallback) in [("KHR", json!({"fallback": true})), ("EXT", json!({}))] {
-        let name = format!("{name}_meshopt_compression");
-        let view = json!({"buffer": 1, "byteLength": 34, "byteStride": 12, "count": 3, "mode": "ATTRIBUTES"});
-        let mut document = json!({
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-            "extensionsUsed": [name], "extensionsRequired": [name],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-            "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3, "min": [0, 0, 0], "max": [1, 1, 0]}],
-            "bufferViews": [{"buffer": 0, "byteLength": 36, "byteStride": 12, "extensions": {&name: view}}],
-            "buffers": [{"byteLength": 36, "extensions": {&name: fallback}},
-                {"byteLength": 34, "uri": format!("data:application/octet-stream;base64,{MESHOPT}")}],
-        });
-        let scene = read(&document).unwrap();
-        assert_eq!(scene.warnings, [""; 0]);
-        assert_eq!(scene.meshes[0].positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
-        document["bufferViews"][0]["extensions"][&name]["count"] = 4.into();
-        let message = message(read(&document));
-        assert!(message.contains(&format!("bufferViews[0].extensions.{name}")), "{message}");
-    }
-}
-
-/// Four vertices with a colour each and two triangles, compressed by Draco.
-const DRACO: &str =
-    "RFJBQ08CAgEAAAACBAEAAQICAQMBAgAJAwAAAgIEAAEAAQAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAgD8AAIA/AAAAPwABA\
-    QAJAwEQASATARADAJCQaYBhxrxcBgAAAAD/AAAA";
-
-#[test]
-fn compressed_primitives_replace_their_accessors() {
-    let document = |extension: Value| {
-        json!({
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-            "extensionsUsed": ["KHR_draco_mesh_compression"], "extensionsRequired": ["KHR_draco_mesh_compression"],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 1}, "indices": 2,
-                "extensions": {"KHR_draco_mesh_compression": extension}}]}],
-            "accessors": [
-                {"componentType": 5126, "type": "VEC3", "count": 4, "min": [0, 0, 0], "max": [1, 1, 0.5]},
-                {"componentType": 5121, "type": "VEC4", "count": 4, "normalized": true},
-                {"componentType": 5123, "type": "SCALAR", "count": 6}],
-            "bufferViews": [{"buffer": 0, "byteLength": 114}],
-            "buffers": [{"byteLength": 114, "uri": format!("data:application/octet-stream;base64,{DRACO}")}],
-        })
-    };
-    let scene = read(&document(json!({"bufferView": 0, "attributes": {"POSITION": 0, "COLOR_0": 1}}))).unwrap();
-    assert_eq!(scene.warnings, [""; 0]);
-    let mesh = &scene.meshes[0];
-    assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.5)]);
-    let opaque = [Vec3::X, Vec3::Y, Vec3::Z].map(|color| color.extend(1.0));
-    assert_eq!(mesh.colors, [opaque[0], opaque[1], opaque[2], Vec4::new(0.2, 0.4, 0.6, 0.8)]);
-    assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3]]);
-    // What is not in the compressed data comes from its accessor: here one without data, which is black.
-    let scene = read(&document(json!({"bufferView": 0, "attributes": {"POSITION": 0}}))).unwrap();
-    assert_eq!(scene.meshes[0].colors, [Vec4::ZERO; 4]);
-    for (extension, fault) in [
-        (json!({"bufferView": 0, "attributes": {"POSITION": 7}}), "POSITION has number 7"),
-        (json!({"bufferView": 1, "attributes": {"POSITION": 0}}), "bufferView"),
-        (json!({"attributes": {"POSITION": 0}}), "bufferView"),
-        (json!({}), "bufferView"),
-    ] {
-        let message = message(read(&document(extension)));
-        assert!(message.contains(fault), "{message}");
-    }
 }

@@ -1,6 +1,6 @@
 //! Documents that ask for too much, and documents changed at random, written by the tests themselves.
 
-use super::gltf::{message, Builder, TRIANGLE};
+use super::documents::{message, Builder, TRIANGLE};
 use glam::DVec3;
 use glimt::scene::{gltf, Instancing, Soup};
 use glimt::{Result, Scene};
@@ -215,7 +215,7 @@ fn lively() -> Value {
 /// Positions compressed by meshopt, standing in three places, beside a camera and a light.
 fn compressed() -> Value {
     let view = json!({"buffer": 1, "byteLength": 34, "byteStride": 12, "count": 3, "mode": "ATTRIBUTES"});
-    let data = super::gltf::MESHOPT;
+    let data = super::compressed::MESHOPT;
     json!({
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
         "extensionsUsed": ["EXT_meshopt_compression", "EXT_mesh_gpu_instancing", "KHR_lights_punctual"],

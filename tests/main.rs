@@ -5,8 +5,11 @@
 //! * `bvh` — invariants on random and hostile boxes, determinism
 //! * `scene` — shapes, transforms, cameras, materials
 //! * `gltf` — accessors of every kind, hierarchies, faults, written by the tests themselves
+//! * `compressed` — Draco and meshopt
 //! * `account` — what becomes of extensions and pictures, `--strict`, `info`
-//! * `poses` — animations, skins, morph targets against values computed by hand; variants, visibility, sequences
+//! * `poses` — animations and morph targets against values computed by hand; variants, visibility
+//! * `skins` — vertices that follow joints, against values computed by hand
+//! * `sequences` — pictures of an animation, trees refitted or built anew
 //! * `frames` — pictures: against the reference, closed forms, determinism, features
 //! * `textures` — samplers, maps, alpha and coloured shadows, against the reference and closed forms
 //! * `hard_scenes` — pictures that are hard on trees, stacks and f32
@@ -28,7 +31,10 @@ mod batch;
 mod broken;
 mod bvh;
 mod cli;
+mod compressed;
 mod corpus;
+mod corpus_folder;
+mod documents;
 mod frames;
 mod gltf;
 mod hard_scenes;
@@ -37,6 +43,8 @@ mod layout;
 mod measuring;
 mod poses;
 mod scene;
+mod sequences;
+mod skins;
 mod stress;
 mod study;
 mod support;

@@ -4,7 +4,7 @@ use glimt::render::Renderer;
 use glimt::scene::Soup;
 use glimt::vulkan::{DeviceChoice, Fetch, Habits};
 use glimt::{film, reference, Film, Options, Report, Scene};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::OnceLock;
 
 /// The device, opened once with the validation layers. No device is a failure.
@@ -56,13 +56,4 @@ pub fn assert_alike(name: &str, reference: &Film, picture: &Film) {
     }
 }
 
-/// The shared corpus; `None`, with a printed reason, where it is absent. With CI=true it must be there.
-pub fn corpus() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus");
-    if path.is_dir() {
-        return Some(path);
-    }
-    assert!(std::env::var("CI").as_deref() != Ok("true"), "CI=true, but there is no corpus at {}", path.display());
-    println!("skipped: no corpus at {}", path.display());
-    None
-}
+pub use super::corpus_folder::corpus;

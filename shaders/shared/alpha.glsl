@@ -15,32 +15,28 @@ struct Veil {
 /// The veil at a point of a triangle, in the finest level of its textures: what is there and what is not must not depend on how far away it
 /// is. `word` is the triangle's material and flags.
 Veil veil_at(uint primitive, uint word, vec2 barycentrics) {
-    uint first = bitfieldExtract(word, 0, int(MATERIAL_BITS)) * MATERIAL_TEXELS + LOOK_TEXEL;
-    vec4 color = FETCH_FLOATS(materials, first);
-    float metallic = FETCH_FLOATS(materials, first + 1u).x;
-    float cutoff = FETCH_FLOATS(materials, first + 2u).w;
-    uvec4 maps = FETCH(materials, first + 3u);
-    uint transmission_map = FETCH(materials, first + 4u).w;
-    uvec4 last = FETCH(materials, first + 5u);
+    Look look = look_at(bitfieldExtract(word, 0, int(MATERIAL_BITS)));
+    vec4 color = vec4(look.base_color, look.alpha);
+    float metallic = look.metallic;
+    float transmission = look.transmission;
     if (VERTEX_COLORS && (word & TRIANGLE_COLORED) != 0u) {
         uint corner = frame.first_color + primitive * TRIANGLE_TEXELS;
         color *= (1.0 - barycentrics.x - barycentrics.y) * FETCH_FLOATS(attributes, corner) +
                  barycentrics.x * FETCH_FLOATS(attributes, corner + 1u) +
                  barycentrics.y * FETCH_FLOATS(attributes, corner + 2u);
     }
-    float transmission = uintBitsToFloat(last.x);
     if (TEXTURES) {
         Place place = Place(primitive, barycentrics, vec2(0.0), vec2(0.0));
-        if (maps.x != 0u)
-            color *= map_at(maps.x, place);
-        if (transmission_map != 0u)
-            transmission *= map_at(transmission_map, place).r;
-        if (maps.y != 0u && transmission > 0.0)
-            metallic *= map_at(maps.y, place).b;
+        if (look.base_color_map != 0u)
+            color *= map_at(look.base_color_map, place);
+        if (look.transmission_map != 0u)
+            transmission *= map_at(look.transmission_map, place).r;
+        if (look.metallic_roughness_map != 0u && transmission > 0.0)
+            metallic *= map_at(look.metallic_roughness_map, place).b;
     }
-    float alpha = last.y == ALPHA_BLEND ? clamp(color.a, 0.0, 1.0) : last.y == ALPHA_MASK && color.a < cutoff ? 0.0 : 1.0;
-    vec3 attenuation = FETCH_FLOATS(materials, first + 6u).xyz;
-    return Veil(alpha, color.rgb, color.rgb * attenuation, transmission * (1.0 - metallic));
+    bool is_hole = look.alpha_mode == ALPHA_MASK && color.a < look.cutoff;
+    float alpha = look.alpha_mode == ALPHA_BLEND ? clamp(color.a, 0.0, 1.0) : is_hole ? 0.0 : 1.0;
+    return Veil(alpha, color.rgb, color.rgb * look.attenuation, transmission * (1.0 - metallic));
 }
 
 /// What is seen of things behind it: the share that does not meet the surface, and what passes it, tinted.

@@ -30,7 +30,8 @@ Look look_at(uint index) {
     uvec4 e = FETCH(materials, first + 4u);
     uvec4 f = FETCH(materials, first + 5u);
     vec4 g = FETCH_FLOATS(materials, first + 6u);
-    return Look(a.xyz, a.w, b.x, b.y, b.z, b.w, c.xyz, c.w, d.x, d.y, d.z, d.w, e.x, e.y, e.z, e.w, uintBitsToFloat(f.x), f.y, f.z, f.w, g.xyz, floatBitsToUint(g.w));
+    return Look(a.xyz, a.w, b.x, b.y, b.z, b.w, c.xyz, c.w, d.x, d.y, d.z, d.w, e.x, e.y, e.z, e.w,
+                uintBitsToFloat(f.x), f.y, f.z, f.w, g.xyz, floatBitsToUint(g.w));
 }
 
 Light light_of(uint index) {

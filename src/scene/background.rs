@@ -46,14 +46,9 @@ impl Background {
     }
 }
 
-/// Linear value of an 8-bit sRGB one (IEC 61966-2-1).
-fn linear(srgb: u8) -> f64 {
-    let value = f64::from(srgb) / 255.0;
-    if value <= 0.04045 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
-    }
+/// Linear value of an 8-bit sRGB one.
+fn linear(code: u8) -> f64 {
+    super::srgb::decode(f64::from(code) / 255.0)
 }
 
 impl FromStr for Background {

@@ -1,6 +1,6 @@
 //! Mipmaps: a picture, then the same half as wide and high, down to one pixel.
 
-use super::{Image, Pixels};
+use super::{srgb, Image, Pixels};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -97,22 +97,18 @@ fn codes(is_srgb: bool) -> Vec<u8> {
     (0..=u16::MAX).map(|step| (255.0 * code(step)).round() as u8).collect()
 }
 
-/// Light of a colour channel, both 0 to 1 (IEC 61966-2-1).
+/// Light of a channel, both 0 to 1.
 fn decode(value: f32, is_srgb: bool) -> f32 {
-    match is_srgb {
-        false => value,
-        true if value <= 0.04045 => value / 12.92,
-        true => ((value + 0.055) / 1.055).powf(2.4),
+    if is_srgb {
+        srgb::decode(value.into()) as f32
+    } else {
+        value
     }
 }
 
 /// Undoes [`decode`] on a pixel's colours.
 fn encoded([r, g, b, a]: [f32; 4], is_srgb: bool) -> [f32; 4] {
-    let encode = |light: f32| match is_srgb {
-        false => light,
-        true if light <= 0.003_130_8 => 12.92 * light,
-        true => 1.055 * light.powf(1.0 / 2.4) - 0.055,
-    };
+    let encode = |light: f32| if is_srgb { srgb::encode(light.into()) as f32 } else { light };
     [encode(r), encode(g), encode(b), a]
 }
 

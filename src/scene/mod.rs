@@ -24,6 +24,7 @@ mod precedence;
 mod sampling;
 pub mod shapes;
 mod soup;
+mod srgb;
 mod tangents;
 mod teapot;
 mod texture;

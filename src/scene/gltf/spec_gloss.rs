@@ -3,6 +3,7 @@
 
 use super::materials::Properties;
 use super::Document;
+use crate::scene::srgb::{decode, encode};
 use crate::scene::{Image, Map, Material, Pixels, Scene, Texture};
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
@@ -126,22 +127,6 @@ fn pixel(image: &Image, x: u32, y: u32, width: u32, height: u32) -> DVec4 {
         Pixels::Rgba16(pixels) => pixels[index].map(|value| f64::from(value) / 65535.0),
     };
     DVec4::new(decode(r), decode(g), decode(b), a)
-}
-
-fn decode(code: f64) -> f64 {
-    if code <= 0.04045 {
-        code / 12.92
-    } else {
-        ((code + 0.055) / 1.055).powf(2.4)
-    }
-}
-
-fn encode(light: f64) -> f64 {
-    if light <= 0.003_130_8 {
-        12.92 * light
-    } else {
-        1.055 * light.powf(1.0 / 2.4) - 0.055
-    }
 }
 
 #[cfg(test)]

@@ -3,18 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
 
 use super::*;
-use std::path::PathBuf;
 
-/// The shared corpus; `None`, with a printed reason, where it is absent. With CI=true it must be there.
-pub(super) fn corpus() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus");
-    if path.is_dir() {
-        return Some(path);
-    }
-    assert!(std::env::var("CI").as_deref() != Ok("true"), "CI=true, but there is no corpus at {}", path.display());
-    println!("skipped: no corpus at {}", path.display());
-    None
-}
+#[path = "../../../tests/corpus_folder.rs"]
+mod corpus_folder;
+pub(super) use corpus_folder::corpus;
 
 /// Opens a file with its buffers, whatever extensions it requires.
 pub(super) fn with_document<T>(path: &Path, visit: impl FnOnce(&Document) -> T) -> T {
