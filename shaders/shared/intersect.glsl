@@ -113,10 +113,10 @@ bool is_met(uint primitive, uint word, vec2 barycentrics, bool any, inout Hit hi
     return max(hit.passed.r, max(hit.passed.g, hit.passed.b)) < NO_LIGHT;
 }
 
-/// Takes the triangle as the new hit if it is nearer than the old one. Where `any` hit will do, backs count too. A ray for which that cannot
+/// Takes the triangle, which begins at `first` of all texels, as the new hit if it is nearer than the old one. Where `any` hit will do, backs count too. A ray for which that cannot
 /// be decided is `uncertain`.
-bool intersect_triangle(ShearedRay ray, uint triangle, uint instance, bool any, inout Hit hit, inout bool uncertain) {
-    uint first = triangle * TRIANGLE_TEXELS;
+bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance, bool any, inout Hit hit,
+                        inout bool uncertain) {
     uvec4 texel_a = FETCH(triangles, first);
     uvec4 texel_b = FETCH(triangles, first + 1u);
     uvec4 texel_c = FETCH(triangles, first + 2u);

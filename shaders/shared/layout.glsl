@@ -6,16 +6,16 @@
 const uint WORKGROUP = 64u;
 /// Pixels along a side of a tile. Pixels are numbered tile by tile, row by row, in Morton order inside a tile.
 const uint TILE = 8u;
-/// Hard bound on the depth of the tree: the builder keeps it, the traversal's array stack relies on it.
+/// Hard bound on the depth of the tree, binary or wide: the builder keeps it, the traversal's array stack relies on it.
 const uint MAX_TREE_DEPTH = 64u;
 /// Nodes that the traversal's stack of registers holds.
-const uint STACK_REGISTERS = 10u;
+const uint STACK_REGISTERS = 14u;
 /// Most triangles in a leaf that its 32-bit reference can name.
 const uint MAX_LEAF_TRIANGLES = 14u;
 /// In place of a leaf's number of triangles: it is an instance.
 const uint LEAF_IS_INSTANCE = 15u;
-/// Texels (16 bytes) in one tree node: a record for each of its two children.
-const uint NODE_TEXELS = 2u;
+/// Texels (16 bytes) in one tree node: a record for each of its children.
+const uint NODE_TEXELS = 4u;
 /// Texels in one triangle of the traversal, and in one triangle's normals, colours, texture coordinates or tangents.
 const uint TRIANGLE_TEXELS = 3u;
 /// Texels in a Material and the Look behind it.

@@ -1,9 +1,12 @@
-// The tree and the walk through it: a binary tree of quantised boxes, walked while-while (Aila and Laine, HPG 2009), the
-// nearer child first. The stack is a shift register: ten variables that move up and down, touched with constant indices
+// The tree and the walk through it: nodes of four quantised boxes, walked while-while (Aila and Laine, HPG 2009), the
+// nearest child first. The stack is a shift register: a few variables that move up and down, touched with constant indices
 // only, because an indexed array costs software Vulkan eight scalar branches a push. When a live entry falls off its end,
 // the ray goes to the retrace queue, where a variant of the same kernel walks again with an array as deep as the tree can be:
-// rare, and no ray is ever lost. The same happens to a ray that f32 cannot tell whether it hits, and to a walk that the driver cut short; if that is still too long, it is done again
-// subtree by subtree.
+// rare, and no ray is ever lost. The same happens to a ray that f32 cannot tell whether it hits, and to a walk that the driver
+// cut short; if that is still too long, it is done again subtree by subtree.
+//
+// Loops end at their bottom, do … while: Mesa 22.3 runs a loop's body before it asks whether any ray still needs it, so that
+// one that ends at its top makes a round for nothing.
 
 /// No node: the stack is empty.
 const int NOTHING = int(0x80000000);
@@ -25,8 +28,12 @@ GridRay grid_ray(Ray ray, vec3 grid_origin, vec3 grid_scale) {
     return GridRay((ray.origin - grid_origin) * grid_scale, 1.0 / (direction * grid_scale));
 }
 
-/// Slab test against a child's box. Distances are compared as integers, which orders them like floats because entry ≥ 0.
-bool enters(GridRay ray, uvec4 child, float t_max, out float entry) {
+/// In place of the distance at which a ray enters a box: it does not.
+const int MISSED = 0x7fffffff;
+
+/// Slab test against a child's box: the distance at which the ray enters it, or MISSED. Distances are compared as integers,
+/// which orders them like floats because they are ≥ 0.
+int entry_of(GridRay ray, uvec4 child, float t_max) {
     vec3 lo = vec3(child.x & 0xffffu, child.x >> 16u, child.y & 0xffffu);
     vec3 hi = vec3(child.y >> 16u, child.z & 0xffffu, child.z >> 16u);
     ivec3 t_lo = floatBitsToInt((lo - ray.origin) * ray.inverse);
@@ -35,29 +42,49 @@ bool enters(GridRay ray, uvec4 child, float t_max, out float entry) {
     ivec3 far = max(t_lo, t_hi);
     int first = max(max(near.x, near.y), max(near.z, 0));
     int last = min(min(far.x, far.y), min(far.z, floatBitsToInt(t_max)));
-    entry = intBitsToFloat(first);
-    return first <= last;
+    return first > last ? MISSED : first;
 }
 
-/// What a node's two children mean for the walk.
-struct Visit {
-    bool both;
-    bool none;
-    int nearer;
-    int farther;
+/// A child as a ray meets it.
+struct Branch {
+    int entry;
+    int node;
 };
 
-/// The nearer of two that are entered comes first, unless any hit will do.
-Visit visit(GridRay ray, int node, float t_max, bool any) {
-    uvec4 child_0 = FETCH(nodes, uint(node) * NODE_TEXELS);
-    uvec4 child_1 = FETCH(nodes, uint(node) * NODE_TEXELS + 1u);
-    float entry_0;
-    float entry_1;
-    bool enters_0 = enters(ray, child_0, t_max, entry_0);
-    bool enters_1 = enters(ray, child_1, t_max, entry_1);
-    bool swapped = any ? !enters_0 : enters_1 && (!enters_0 || entry_1 < entry_0);
-    return Visit(enters_0 && enters_1, !(enters_0 || enters_1),
-                 int(swapped ? child_1.w : child_0.w), int(swapped ? child_0.w : child_1.w));
+Branch branch(GridRay ray, uvec4 child, float t_max) {
+    return Branch(entry_of(ray, child, t_max), int(child.w));
+}
+
+void swap_unless_nearer(inout Branch first, inout Branch second) {
+    bool swapped = second.entry < first.entry;
+    int farther = max(first.entry, second.entry);
+    first.entry = min(first.entry, second.entry);
+    second.entry = farther;
+    int node = swapped ? second.node : first.node;
+    second.node = swapped ? first.node : second.node;
+    first.node = node;
+}
+
+/// A node's children, nearest first, those that are missed last.
+struct Visit {
+    Branch first;
+    Branch second;
+    Branch third;
+    Branch fourth;
+};
+
+Visit visit(GridRay ray, int node, float t_max) {
+    uint texel = uint(node) * NODE_TEXELS;
+    // All are fetched before any is tested, so that the processor waits for all at once.
+    uvec4 children[4] = {FETCH(nodes, texel), FETCH(nodes, texel + 1u), FETCH(nodes, texel + 2u), FETCH(nodes, texel + 3u)};
+    Visit next = Visit(branch(ray, children[0], t_max), branch(ray, children[1], t_max), branch(ray, children[2], t_max),
+                       branch(ray, children[3], t_max));
+    swap_unless_nearer(next.first, next.second);
+    swap_unless_nearer(next.third, next.fourth);
+    swap_unless_nearer(next.first, next.third);
+    swap_unless_nearer(next.second, next.fourth);
+    swap_unless_nearer(next.second, next.third);
+    return next;
 }
 
 /// Where a walk is: in the world's tree, or, with INSTANCES, in the tree of an instance, with the ray in its space. The ray's
@@ -105,11 +132,15 @@ bool visit_leaf(inout Walk walk, int leaf, bool any, inout Hit hit) {
     uint reference = uint(~leaf);
     uint triangle = reference >> 4u;
     uint end = triangle + (reference & 15u);
+    // Counted along: a multiplication of integers takes as long as ten additions.
+    uint texel = triangle * TRIANGLE_TEXELS;
     bool found = false;
-    while (triangle < end && triangle != uint(IMPOSSIBLE)) {
-        found = intersect_triangle(walk.ray, triangle, walk.instance, any, hit, walk.uncertain) || found;
+    do {
+        if (triangle < end)
+            found = intersect_triangle(walk.ray, triangle, texel, walk.instance, any, hit, walk.uncertain) || found;
         triangle++;
-    }
+        texel += TRIANGLE_TEXELS;
+    } while (triangle < end && triangle != uint(IMPOSSIBLE));
     walk.cut = walk.cut || triangle < end;
     return found;
 }
@@ -123,21 +154,25 @@ bool is_complete(int node, bool cut) {
     return node == NOTHING && !cut;
 }
 
-/// The walk through a subtree with an array for a stack, as deep as any two trees. The host looks at the count of those that
+/// The walk through a subtree with an array for a stack, with room for three siblings on each level of any two trees. The host looks at the count of those that
 /// are cut short even so: a wrong picture is never written.
 void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
-    int stack[2u * MAX_TREE_DEPTH + 1u];
+    int stack[2u * 3u * MAX_TREE_DEPTH + 1u];
     int height = 0;
     Walk walk = begin_walk(world_ray);
     int node = any && hit.triangle != NO_TRIANGLE ? NOTHING : int(step_now.root);
     while (node != NOTHING && node != IMPOSSIBLE) {
         bool found = false;
         if (node >= 0) {
-            Visit next = visit(walk.grid, node, hit.t, any);
-            if (next.both)
-                stack[height++] = next.farther;
-            node = next.nearer;
-            if (!next.none)
+            Visit next = visit(walk.grid, node, hit.t);
+            if (next.fourth.entry != MISSED)
+                stack[height++] = next.fourth.node;
+            if (next.third.entry != MISSED)
+                stack[height++] = next.third.node;
+            if (next.second.entry != MISSED)
+                stack[height++] = next.second.node;
+            node = next.first.node;
+            if (next.first.entry != MISSED)
                 continue;
         } else if (INSTANCES && node == LEAVE) {
             leave_instance(walk, world_ray);
@@ -161,12 +196,39 @@ struct Stack {
     int overflow;
 };
 
-void push(inout Stack stack, int node) {
+/// Moves the entries up by `places`.
+void shift(inout Stack stack, int places) {
+    [[unroll]] for (int i = REGISTERS - 1; i >= places; i--)
+        stack.entries[i] = stack.entries[i - places];
+}
+
+/// Remembers that an entry falls off the end, if it was a node.
+void note_loss(inout Stack stack, bool is_lost, int entry) {
     if (DEEP_TREE)
-        stack.overflow |= stack.entries[REGISTERS - 1] ^ NOTHING;
-    [[unroll]] for (int i = REGISTERS - 1; i > 0; i--)
-        stack.entries[i] = stack.entries[i - 1];
+        stack.overflow |= is_lost ? entry ^ NOTHING : 0;
+}
+
+void push(inout Stack stack, int node) {
+    note_loss(stack, true, stack.entries[REGISTERS - 1]);
+    shift(stack, 1);
     stack.entries[0] = node;
+}
+
+/// All but the nearest, the farthest first: in two moves, of two places and of one.
+void push_siblings(inout Stack stack, Visit next) {
+    bool one = next.second.entry != MISSED;
+    bool two = next.third.entry != MISSED;
+    bool three = next.fourth.entry != MISSED;
+    note_loss(stack, one, stack.entries[REGISTERS - 1]);
+    note_loss(stack, two, stack.entries[REGISTERS - 2]);
+    note_loss(stack, three, stack.entries[REGISTERS - 3]);
+    if (two)
+        shift(stack, 2);
+    if (one && (three || !two))
+        shift(stack, 1);
+    stack.entries[0] = one ? next.second.node : stack.entries[0];
+    stack.entries[1] = two ? next.third.node : stack.entries[1];
+    stack.entries[2] = three ? next.fourth.node : stack.entries[2];
 }
 
 void pop(inout Stack stack) {
@@ -183,16 +245,18 @@ bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
     [[unroll]] for (int i = 0; i < REGISTERS; i++)
         stack.entries[i] = NOTHING;
     int node = 0;
-    while (node != NOTHING) {
+    do {
         // An inner node, and not IMPOSSIBLE.
-        while (uint(node) < uint(IMPOSSIBLE)) {
-            Visit next = visit(walk.grid, node, hit.t, any);
-            node = next.none ? stack.entries[0] : next.nearer;
-            if (next.both)
-                push(stack, next.farther);
-            if (next.none)
-                pop(stack);
-        }
+        do {
+            if (uint(node) < uint(IMPOSSIBLE)) {
+                Visit next = visit(walk.grid, node, hit.t);
+                bool none = next.first.entry == MISSED;
+                node = none ? stack.entries[0] : next.first.node;
+                push_siblings(stack, next);
+                if (none)
+                    pop(stack);
+            }
+        } while (uint(node) < uint(IMPOSSIBLE));
         if (node >= 0 || node == NOTHING)
             break;
         if (is_instance(node)) {
@@ -212,7 +276,7 @@ bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
             stack.overflow = 0;
             walk.uncertain = false;
         }
-    }
+    } while (node != NOTHING);
     return is_complete(node, walk.cut) && stack.overflow == 0 && !walk.uncertain;
 }
 

@@ -59,7 +59,9 @@ pub(super) fn build(space: &mut [Reference], count: usize, recipe: Recipe) -> Bv
         }
     }
     let depth = depths.into_iter().max().unwrap_or(0).into();
-    Bvh { nodes, order, bounds: bounds.aabb(), depth }
+    let mut bvh = Bvh { nodes, order, bounds: bounds.aabb(), depth, wide: Vec::new(), wide_depth: 0, wide_stack: 0 };
+    bvh.widen();
+    bvh
 }
 
 impl Builder<'_> {

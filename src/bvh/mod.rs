@@ -1,7 +1,7 @@
 //! Boxes or triangles → a binary bounding volume hierarchy over them. Knows no meshes.
 //!
-//! [`Bvh::over_boxes`] makes the tree in f32 by the surface area heuristic, [`Bvh::over_triangles`] may also cut triangles; [`quantise`] turns it into the 16-byte child records
-//! that the kernels walk. The tree's depth is bounded, hard, by `MAX_TREE_DEPTH`: the traversal's stack relies on it.
+//! [`Bvh::over_boxes`] makes the tree in f32 by the surface area heuristic, [`Bvh::over_triangles`] may also cut triangles; [`quantise`] turns it, four children a node, into the
+//! 16-byte child records that the kernels walk. The tree's depth is bounded, hard, by `MAX_TREE_DEPTH`: the traversal's stack relies on it.
 
 mod aabb;
 mod build;
@@ -11,10 +11,12 @@ mod references;
 mod refit;
 mod spatial_split;
 mod stats;
+mod wide;
 
 pub use aabb::Aabb;
 pub use quantise::{quantise, reference, Grid, Quantised};
 pub use stats::Stats;
+pub use wide::{Side, WideChild, WideNode, WIDTH};
 
 use crate::layout::{MAX_LEAF_TRIANGLES, MAX_TREE_DEPTH};
 use build::Recipe;
@@ -59,6 +61,12 @@ pub struct Bvh {
     pub bounds: Aabb,
     /// Levels of inner nodes.
     pub depth: u32,
+    /// The same tree with up to four children a node, as the kernels walk it. Node 0 is the root.
+    pub wide: Vec<WideNode>,
+    /// Its levels.
+    pub wide_depth: u32,
+    /// Most nodes that wait on the stack of a walk through it.
+    pub wide_stack: u32,
 }
 
 /// How much work goes into a tree.

@@ -7,7 +7,7 @@
 //! Boxes are rounded outward, by more than the slab test's own error: about 4e-7 of the distance to the origin of the ray in
 //! quanta, so the further away a camera stands, the wider.
 
-use super::{Aabb, Bvh, Child};
+use super::{Aabb, Bvh, Child, WideChild};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -28,11 +28,14 @@ pub struct Grid {
 /// A tree for the device.
 #[derive(Clone, Debug)]
 pub struct Quantised {
-    /// Two records a node.
+    /// One for each child of a wide node, WIDTH a node.
     pub records: Vec<[u32; 4]>,
     /// Their grid.
     pub grid: Grid,
 }
+
+/// In place of a child that is not there: a leaf without triangles, in the corner of the grid where nothing is.
+const NO_CHILD: [u32; 4] = [0, 0, 0, !0];
 
 impl Grid {
     /// A grid over `bounds` with room for `margin` quanta around it.
@@ -70,7 +73,9 @@ pub fn quantise(bvh: &Bvh, reach: Vec3, outward: bool, refer: impl Fn(Child) -> 
     let rough = Grid::over(&bounds, 1.0);
     let margin = 0.05 + ((reach + far) * rough.scale.as_dvec3()).max_element() * SLAB_ERROR;
     let grid = Grid::over(&bounds, margin + 1.0);
-    let record = |bounds: &Aabb, child: &Child| {
+    let record = |child: &Option<WideChild>| {
+        let Some(WideChild { side, child }) = child else { return NO_CHILD };
+        let bounds = bvh.bounds_of(*side);
         let round = |lower: DVec3, upper: DVec3| match outward {
             true => ((lower - margin).floor(), (upper + margin).ceil()),
             false => (lower.round(), upper.round()),
@@ -80,32 +85,33 @@ pub fn quantise(bvh: &Bvh, reach: Vec3, outward: bool, refer: impl Fn(Child) -> 
         let hi = hi.clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
         [lo.x | lo.y << 16, lo.z | hi.x << 16, hi.y | hi.z << 16, refer(*child)]
     };
-    let records = bvh
-        .nodes
-        .par_iter()
-        .flat_map_iter(|node| [record(&node.bounds[0], &node.children[0]), record(&node.bounds[1], &node.children[1])]);
+    let records = bvh.wide.par_iter().flat_map_iter(|node| node.each_ref().map(record));
     Quantised { records: records.collect(), grid }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Side, WIDTH};
     use super::*;
 
     #[test]
     fn the_example_of_the_bit_layout() {
         let bounds = Aabb { lo: Vec3::ZERO, hi: Vec3::splat(60000.0) };
+        let children = [Child::Leaf { first: 10, count: 3 }, Child::Node(7)];
+        let wide = |side: u8| Some(WideChild { side: Side { node: 0, side }, child: children[usize::from(side)] });
         let bvh = Bvh {
-            nodes: vec![super::super::Node {
-                bounds: [bounds; 2],
-                children: [Child::Leaf { first: 10, count: 3 }, Child::Node(7)],
-            }],
+            nodes: vec![super::super::Node { bounds: [bounds; 2], children }],
             order: vec![0],
             bounds,
             depth: 1,
+            wide: vec![[wide(0), wide(1), None, None]],
+            wide_depth: 1,
+            wide_stack: 1,
         };
         let quantised = quantise(&bvh, Vec3::ZERO, true, |child| reference(child, 0, 0));
         assert_eq!(quantised.records[0][3], 0xffff_ff5c);
         assert_eq!(quantised.records[1][3], 7);
+        assert_eq!(quantised.records[2..], [[0, 0, 0, 0xffff_ffff]; 2]);
     }
 
     #[test]
@@ -123,8 +129,9 @@ mod tests {
                 DVec3::from_array(coordinates.map(f64::from)) / quantised.grid.scale.as_dvec3()
                     + quantised.grid.origin.as_dvec3()
             };
-            for (node, records) in bvh.nodes.iter().zip(quantised.records.chunks(2)) {
-                for (bounds, [x, y, z, _]) in node.bounds.iter().zip(records) {
+            for (node, records) in bvh.wide.iter().zip(quantised.records.chunks(WIDTH)) {
+                for (child, [x, y, z, _]) in node.iter().flatten().zip(records) {
+                    let bounds = bvh.bounds_of(child.side);
                     let lo = world([x & 0xffff, x >> 16, y & 0xffff]);
                     let hi = world([y >> 16, z & 0xffff, z >> 16]);
                     assert!(

@@ -4,8 +4,8 @@
 //! own space, about its own centre, and an upper tree over the instances' boxes has one instance in each leaf. Every space of the
 //! device is a [`Rebase`] of one of the scene's.
 
-use crate::bvh::{quantise, reference, Aabb, Bvh, Child, Grid, Quality};
-use crate::layout::{Features, Instance, LEAF_IS_INSTANCE, STACK_REGISTERS};
+use crate::bvh::{quantise, reference, Aabb, Bvh, Child, Grid, Quality, WIDTH};
+use crate::layout::{Features, Instance, LEAF_IS_INSTANCE, NODE_TEXELS, STACK_REGISTERS};
 use crate::report;
 use crate::scene::{Placement, Projection, Soup, View};
 use glam::{DMat3, DMat4, DVec3, Vec3};
@@ -143,7 +143,7 @@ impl Rebase {
 /// Sizes on the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TreeSize {
-    /// Inner nodes of all trees.
+    /// Wide nodes of all trees.
     pub nodes: usize,
     /// Triangles in leaves; one that was cut counts for each of its parts.
     pub triangles: usize,
@@ -153,7 +153,7 @@ pub struct TreeSize {
 
 /// What the device gets.
 pub(super) struct DeviceTree {
-    /// Two records a node; the root is node 0.
+    /// WIDTH records a node; the root is node 0.
     pub records: Vec<[u32; 4]>,
     /// Grid of the root's tree.
     pub grid: Grid,
@@ -188,25 +188,25 @@ impl Tree {
     /// The features with what the trees themselves need.
     pub fn features(&self, features: Features) -> Features {
         let instances = features.instances || self.upper.is_some();
-        // Besides the nodes there is a mark on the stack where an instance was entered.
-        let depth = self.depth() + u32::from(instances);
-        Features { deep_tree: features.deep_tree || depth > STACK_REGISTERS, instances, ..features }
+        // One is the mark where an instance was entered.
+        let entries = self.deepest(|bvh| bvh.wide_stack) + u32::from(instances);
+        Features { deep_tree: features.deep_tree || entries > STACK_REGISTERS, instances, ..features }
     }
 
     /// Sizes on the device.
     pub fn size(&self) -> TreeSize {
         let parts = self.parts.iter().map(|part| &part.bvh);
         TreeSize {
-            nodes: parts.clone().chain(&self.upper).map(|bvh| bvh.nodes.len()).sum(),
+            nodes: parts.clone().chain(&self.upper).map(|bvh| bvh.wide.len()).sum(),
             triangles: parts.map(|bvh| bvh.order.len()).sum(),
             instances: self.upper.as_ref().map_or(0, |upper| upper.order.len()),
         }
     }
 
-    /// Levels on the deepest path through both levels of trees.
-    fn depth(&self) -> u32 {
-        let lower = self.parts.iter().map(|part| part.bvh.depth).max().unwrap_or(0);
-        lower + self.upper.as_ref().map_or(0, |upper| upper.depth)
+    /// What is most on any path through both levels of trees.
+    fn deepest(&self, of: impl Fn(&Bvh) -> u32) -> u32 {
+        let lower = self.parts.iter().map(|part| of(&part.bvh)).max().unwrap_or(0);
+        lower + self.upper.as_ref().map_or(0, of)
     }
 
     /// References of subtrees that together are the tree, each small enough that no walk through it is cut short. `None` where
@@ -217,23 +217,22 @@ impl Tree {
         }
         let bvh = &self.parts.first()?.bvh;
         // A round each for the nodes and leaves, and, as each ray of a subgroup may be in another leaf, one for each triangle and ray.
-        let mut rounds = vec![0_u64; bvh.nodes.len()];
+        let mut rounds = vec![0_u64; bvh.wide.len()];
         let of_child = |rounds: &[u64], child: Child| match child {
             Child::Node(index) => rounds[index as usize],
             Child::Leaf { count, .. } => 1 + u64::from(count) * LANES,
         };
-        for index in (0..bvh.nodes.len()).rev() {
-            let children = bvh.nodes[index].children;
-            rounds[index] = 1 + of_child(&rounds, children[0]) + of_child(&rounds, children[1]);
+        let children = |index: usize| bvh.wide[index].iter().flatten().map(|wide| wide.child);
+        for index in (0..bvh.wide.len()).rev() {
+            rounds[index] = 1 + children(index).map(|child| of_child(&rounds, child)).sum::<u64>();
         }
         let mut parts = Vec::new();
         let mut open = vec![Child::Node(0)];
         while let Some(child) = open.pop() {
             match child {
                 Child::Node(index) if of_child(&rounds, child) > MOST_ROUNDS => {
-                    open.extend(bvh.nodes[index as usize].children);
+                    open.extend(children(index as usize));
                 }
-                Child::Leaf { count: 0, .. } => {}
                 _ => parts.push(reference(child, 0, 0)),
             }
         }
@@ -247,9 +246,9 @@ impl Tree {
         let nodes = self.size().nodes;
         report::Tree {
             nodes,
-            depth: self.depth(),
+            depth: self.deepest(|bvh| bvh.wide_depth),
             sah_cost: root.map_or(0.0, |stats| stats.sah_cost),
-            bytes: 32 * nodes as u64,
+            bytes: 16 * u64::from(NODE_TEXELS) * nodes as u64,
             update: self.update,
         }
     }
@@ -298,7 +297,7 @@ impl Tree {
         }
         let mut lower = Vec::new();
         for ((part, range), reach) in self.parts.iter().zip(&soup.parts).zip(reach) {
-            let first_node = (device.records.len() / 2) as u32;
+            let first_node = (device.records.len() / WIDTH) as u32;
             let first_primitive = device.order.len() as u32;
             let refer = |child| reference(child, first_node, first_primitive);
             let quantised = quantise(&part.bvh, reach.as_vec3(), self.rounds_outward, refer);

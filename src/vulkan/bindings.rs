@@ -28,7 +28,7 @@ pub struct BindingSlot {
 impl BindingSlot {
     fn descriptor_type(self, fetch: Fetch) -> vk::DescriptorType {
         match (self.kind, fetch) {
-            (SlotKind::Fetch, Fetch::Texel) => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            (SlotKind::Fetch, Fetch::Texel) => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
             (SlotKind::Fetch, Fetch::Storage) | (SlotKind::Storage, _) => vk::DescriptorType::STORAGE_BUFFER,
             (SlotKind::Uniform, _) => vk::DescriptorType::UNIFORM_BUFFER,
         }
@@ -109,7 +109,7 @@ impl Bindings {
         let device = &layout.device;
         let count = layout.slots.len() as u32;
         let sizes = [
-            vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            vk::DescriptorType::STORAGE_TEXEL_BUFFER,
             vk::DescriptorType::STORAGE_BUFFER,
             vk::DescriptorType::UNIFORM_BUFFER,
         ]
@@ -142,7 +142,7 @@ impl Bindings {
                 .dst_binding(slot.slot)
                 .descriptor_type(kind)
                 .descriptor_count(1);
-            let write = if kind == vk::DescriptorType::UNIFORM_TEXEL_BUFFER {
+            let write = if kind == vk::DescriptorType::STORAGE_TEXEL_BUFFER {
                 write.texel_buffer_view(&views)
             } else {
                 write.buffer_info(&ranges)

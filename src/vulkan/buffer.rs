@@ -72,9 +72,9 @@ impl Buffer {
             )));
         }
         let kind = match usage {
-            Usage::Fetch if texels => vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
+            Usage::Fetch if texels => vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER,
             Usage::FetchedStorage if texels => {
-                vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER
             }
             Usage::Fetch | Usage::Storage | Usage::FetchedStorage => vk::BufferUsageFlags::STORAGE_BUFFER,
             Usage::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,

@@ -8,8 +8,10 @@ use sha2::Digest;
 use std::mem::ManuallyDrop;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Texel buffers smaller than this push a device to storage buffers: SwiftShader and some phones offer 65 536 texels.
+/// Texel buffers smaller than this push a software device to storage buffers: SwiftShader offers 65 536 texels.
 const ENOUGH_TEXELS: u32 = 1 << 26;
+/// So do fewer storage texel buffers in a kernel than there are slots.
+const ENOUGH_TEXEL_BUFFERS: u32 = 32;
 
 /// What kind of thing the device is; in the order of preference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,6 +66,8 @@ pub struct DeviceInfo {
     pub subgroup_size: u32,
     /// Most `uvec4` texels in a texel buffer.
     pub max_texels: u32,
+    /// Most storage texel buffers that a kernel can see.
+    pub max_texel_buffers: u32,
     /// Most bytes in a storage buffer binding.
     pub max_storage_bytes: u64,
     /// Most storage buffers that a kernel can see.
@@ -75,7 +79,7 @@ pub struct DeviceInfo {
 /// Through which kind of buffer kernels fetch the tree and the triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fetch {
-    /// Uniform texel buffers.
+    /// Storage texel buffers: what software Vulkan reads fastest.
     Texel,
     /// Storage buffers.
     Storage,
@@ -191,7 +195,8 @@ impl Device {
         ]) {
             bytes.copy_from_slice(&id.to_le_bytes());
         }
-        let suitable = if info.max_texels >= ENOUGH_TEXELS { Fetch::Texel } else { Fetch::Storage };
+        let enough = info.max_texels >= ENOUGH_TEXELS && info.max_texel_buffers >= ENOUGH_TEXEL_BUFFERS;
+        let suitable = if info.kind == DeviceKind::Cpu && enough { Fetch::Texel } else { Fetch::Storage };
         let device = Arc::new(Self {
             raw,
             queue: Mutex::new(queue),
@@ -293,6 +298,10 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> DeviceInfo {
         },
         subgroup_size: subgroup.subgroup_size,
         max_texels: core.limits.max_texel_buffer_elements,
+        max_texel_buffers: core
+            .limits
+            .max_per_stage_descriptor_storage_images
+            .min(core.limits.max_descriptor_set_storage_images),
         max_storage_bytes: core.limits.max_storage_buffer_range.into(),
         max_storage_buffers: core
             .limits
