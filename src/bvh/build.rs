@@ -5,6 +5,7 @@
 //! threads.
 
 use super::references::{Box4, Reference, Summary};
+use super::reinsert::reinsert;
 use super::{object_split, spatial_split, Bvh, Child, Node};
 use crate::layout::MAX_TREE_DEPTH;
 use glam::Vec3;
@@ -25,6 +26,8 @@ pub(super) struct Recipe<'a> {
     pub leaf: usize,
     /// Corners, for spatial splits, with the share of the root's area that children must overlap before one is tried.
     pub spatial: Option<(&'a [[Vec3; 3]], f32)>,
+    /// Whether subtrees then move to better places.
+    pub reinsert: bool,
 }
 
 struct Builder<'a> {
@@ -41,6 +44,8 @@ pub(super) fn build(space: &mut [Reference], count: usize, recipe: Recipe) -> Bv
     if nodes.is_empty() {
         // The root is always a node, so that traversal needs no special case for small scenes.
         nodes.push(Node { bounds: [bounds.aabb(); 2], children: [root, Child::Leaf { first: 0, count: 0 }] });
+    } else if recipe.reinsert {
+        nodes = reinsert(&nodes);
     }
     // Leaves were numbered by their place in the space; now the gaps between them are closed.
     let mut order = Vec::with_capacity(count);

@@ -9,6 +9,7 @@ mod object_split;
 mod quantise;
 mod references;
 mod refit;
+mod reinsert;
 mod spatial_split;
 mod stats;
 mod wide;
@@ -76,7 +77,7 @@ pub enum Quality {
     Fast,
     /// Spatial splits where boxes overlap much, for up to 3 in 10 more references.
     Balanced,
-    /// Spatial splits wherever they help, for up to as many references again.
+    /// Spatial splits wherever they help, for up to as many references again; then subtrees move to better places.
     Best,
 }
 
@@ -106,7 +107,7 @@ impl Bvh {
     pub fn over_boxes(boxes: &[Aabb], leaf: usize) -> Self {
         let mut references: Vec<Reference> =
             (0..).zip(boxes).map(|(primitive, bounds)| Reference::new(bounds.lo, bounds.hi, primitive)).collect();
-        build::build(&mut references, boxes.len(), Recipe { leaf, spatial: None })
+        build::build(&mut references, boxes.len(), Recipe { leaf, spatial: None, reinsert: false })
     }
 
     /// Builds a tree over triangles, as [`Bvh::over_boxes`]; one that is long may lie in several leaves.
@@ -119,7 +120,7 @@ impl Bvh {
         };
         let mut space: Vec<Reference> = (0..count + free).into_par_iter().map(reference).collect();
         let spatial = (free > 0).then_some((triangles, overlap));
-        build::build(&mut space, count, Recipe { leaf: LEAF, spatial })
+        build::build(&mut space, count, Recipe { leaf: LEAF, spatial, reinsert: quality == Quality::Best })
     }
 
     /// Checks every invariant: each primitive wholly in one leaf, boxes that hold what is below them, leaf sizes, depth, order

@@ -13,7 +13,7 @@ pub enum BvhChoice {
     Fast,
     /// Spatial splits where boxes overlap much
     Balanced,
-    /// Spatial splits wherever they help
+    /// Spatial splits wherever they help, subtrees moved to better places
     Best,
 }
 
