@@ -27,6 +27,9 @@ pub struct WideChild {
 /// A wide node: children where there are any, those without primitives left out.
 pub type WideNode = [Option<WideChild>; WIDTH];
 
+/// See `Bvh::forest_costs`.
+type ForestCost = [f32; WIDTH - 1];
+
 impl Bvh {
     /// The box of a binary node's child.
     pub fn bounds_of(&self, Side { node, side }: Side) -> &Aabb {
@@ -37,9 +40,10 @@ impl Bvh {
         self.nodes[node as usize].children[usize::from(side)]
     }
 
-    /// Makes the wide nodes anew, in depth-first order: in each, the child with the largest surface, which most rays would enter anyway, is
-    /// replaced by its own children until there are four.
+    /// Makes the wide nodes anew, in depth-first order: those binary nodes are left out that make the surfaces of the rest, and so
+    /// the visits of a random ray, fewest (by the dynamic programme of Ylitie, Karras and Laine, HPG 2017).
     pub(super) fn widen(&mut self) {
+        let costs = self.forest_costs();
         let mut wide: Vec<WideNode> = Vec::with_capacity(self.nodes.len() / 2);
         // Binary nodes that become wide ones, with the wide child that waits for the index, their level and what waits on the
         // stack of a walk that comes to them.
@@ -51,7 +55,7 @@ impl Bvh {
                 let child: &mut Option<WideChild> = &mut wide[parent as usize][place];
                 *child = child.map(|it| WideChild { child: Child::Node(index), ..it });
             }
-            let children = self.four_below(node);
+            let children = self.children_of(node, &costs);
             let waiting = waiting + (children.iter().flatten().count() as u32).saturating_sub(1);
             self.wide_depth = self.wide_depth.max(level);
             self.wide_stack = self.wide_stack.max(waiting);
@@ -65,25 +69,59 @@ impl Bvh {
         self.wide = wide;
     }
 
-    /// Up to four children of a wide node over a binary one, their nodes still numbered as in the binary tree.
-    fn four_below(&self, node: u32) -> WideNode {
-        let sides = |node| [0, 1].map(|side| Some(Side { node, side }));
-        let [left, right] = sides(node);
-        let mut four = [left, right, None, None];
-        for free in 2..WIDTH {
-            let surface = |place: &usize| four[*place].map_or(0.0, |side| self.bounds_of(side).half_area());
-            let is_node =
-                |place: &usize| four[*place].is_some_and(|side| matches!(self.child_of(side), Child::Node(_)));
-            let largest = (0..free).filter(is_node).max_by(|a, b| surface(a).total_cmp(&surface(b)));
-            let Some((place, Child::Node(below))) =
-                largest.and_then(|place| Some((place, self.child_of(four[place]?))))
-            else {
-                break;
-            };
-            [four[place], four[free]] = sides(below);
+    /// For each binary node the surfaces of all wide nodes at and below it, at least, if it becomes at most 1, 2, … children of a wide node.
+    fn forest_costs(&self) -> Vec<ForestCost> {
+        let mut costs = vec![[0.0; WIDTH - 1]; self.nodes.len()];
+        // A node comes before what is below it.
+        for (index, node) in self.nodes.iter().enumerate().rev() {
+            let own = node.bounds[0].union(&node.bounds[1]).half_area();
+            costs[index][0] = own + self.best_split(index as u32, WIDTH, &costs).0;
+            for trees in 2..WIDTH {
+                costs[index][trees - 1] = self.best_split(index as u32, trees, &costs).0.min(costs[index][trees - 2]);
+            }
         }
-        let is_filled = |side: &Side| !matches!(self.child_of(*side), Child::Leaf { count: 0, .. });
-        four.map(|side| side.filter(is_filled).map(|side| WideChild { side, child: self.child_of(side) }))
+        costs
+    }
+
+    /// The least cost of a node's two children that together become so many trees, and how many of them the first does.
+    fn best_split(&self, node: u32, trees: usize, costs: &[ForestCost]) -> (f32, usize) {
+        let cost = |side: u8, trees: usize| match self.child_of(Side { node, side }) {
+            Child::Node(below) => costs[below as usize][trees - 1],
+            Child::Leaf { .. } => 0.0,
+        };
+        let split = |first: usize| (cost(0, first) + cost(1, trees - first), first);
+        (1..trees).map(split).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
+    }
+
+    /// The children of a wide node over a binary one, their nodes still numbered as in the binary tree.
+    fn children_of(&self, node: u32, costs: &[ForestCost]) -> WideNode {
+        let mut children = [None; WIDTH];
+        let mut filled = 0;
+        let (_, first) = self.best_split(node, WIDTH, costs);
+        let mut open = vec![(Side { node, side: 1 }, WIDTH - first), (Side { node, side: 0 }, first)];
+        while let Some((side, trees)) = open.pop() {
+            let child = self.child_of(side);
+            match child {
+                Child::Leaf { count: 0, .. } => {}
+                Child::Node(below) if trees > 1 => {
+                    let fewer =
+                        (1..trees).find(|fewer| costs[below as usize][fewer - 1] == costs[below as usize][trees - 1]);
+                    match fewer {
+                        Some(fewer) => open.push((side, fewer)),
+                        None => {
+                            let (_, first) = self.best_split(below, trees, costs);
+                            open.push((Side { node: below, side: 1 }, trees - first));
+                            open.push((Side { node: below, side: 0 }, first));
+                        }
+                    }
+                }
+                _ => {
+                    children[filled] = Some(WideChild { side, child });
+                    filled += 1;
+                }
+            }
+        }
+        children
     }
 }
 
