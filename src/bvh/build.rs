@@ -6,7 +6,7 @@
 
 use super::references::{Box4, Reference, Summary};
 use super::reinsert::reinsert;
-use super::{object_split, spatial_split, Bvh, Child, Node};
+use super::{object_split, spatial_split, Bvh, Child, Node, Wide};
 use crate::layout::MAX_TREE_DEPTH;
 use glam::Vec3;
 
@@ -64,8 +64,8 @@ pub(super) fn build(space: &mut [Reference], count: usize, recipe: Recipe) -> Bv
         }
     }
     let depth = depths.into_iter().max().unwrap_or(0).into();
-    let mut bvh = Bvh { nodes, order, bounds: bounds.aabb(), depth, wide: Vec::new(), wide_depth: 0, wide_stack: 0 };
-    bvh.widen();
+    let mut bvh = Bvh { nodes, order, bounds: bounds.aabb(), depth, wide: Wide::default() };
+    bvh.wide = Wide::of(&bvh);
     bvh
 }
 

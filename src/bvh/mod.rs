@@ -17,7 +17,7 @@ mod wide;
 pub use aabb::Aabb;
 pub use quantise::{quantise, reference, Grid, Quantised};
 pub use stats::Stats;
-pub use wide::{Side, WideChild, WideNode, WIDTH};
+pub use wide::{Side, Wide, WideChild, WideNode, WIDTH};
 
 use crate::layout::{MAX_LEAF_TRIANGLES, MAX_TREE_DEPTH};
 use build::Recipe;
@@ -62,12 +62,8 @@ pub struct Bvh {
     pub bounds: Aabb,
     /// Levels of inner nodes.
     pub depth: u32,
-    /// The same tree with up to four children a node, as the kernels walk it. Node 0 is the root.
-    pub wide: Vec<WideNode>,
-    /// Its levels.
-    pub wide_depth: u32,
-    /// Most nodes that wait on the stack of a walk through it.
-    pub wide_stack: u32,
+    /// The same tree with up to four children a node, as the kernels walk it.
+    pub wide: Wide,
 }
 
 /// How much work goes into a tree.

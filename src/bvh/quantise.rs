@@ -85,13 +85,13 @@ pub fn quantise(bvh: &Bvh, reach: Vec3, outward: bool, refer: impl Fn(Child) -> 
         let hi = hi.clamp(DVec3::ZERO, DVec3::splat(LAST)).as_uvec3();
         [lo.x | lo.y << 16, lo.z | hi.x << 16, hi.y | hi.z << 16, refer(*child)]
     };
-    let records = bvh.wide.par_iter().flat_map_iter(|node| node.each_ref().map(record));
+    let records = bvh.wide.nodes.par_iter().flat_map_iter(|node| node.each_ref().map(record));
     Quantised { records: records.collect(), grid }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Side, WIDTH};
+    use super::super::{Side, Wide, WIDTH};
     use super::*;
 
     #[test]
@@ -104,9 +104,7 @@ mod tests {
             order: vec![0],
             bounds,
             depth: 1,
-            wide: vec![[wide(0), wide(1), None, None]],
-            wide_depth: 1,
-            wide_stack: 1,
+            wide: Wide { nodes: vec![[wide(0), wide(1), None, None]], depth: 1, stack: 1 },
         };
         let quantised = quantise(&bvh, Vec3::ZERO, true, |child| reference(child, 0, 0));
         assert_eq!(quantised.records[0][3], 0xffff_ff5c);
@@ -129,7 +127,7 @@ mod tests {
                 DVec3::from_array(coordinates.map(f64::from)) / quantised.grid.scale.as_dvec3()
                     + quantised.grid.origin.as_dvec3()
             };
-            for (node, records) in bvh.wide.iter().zip(quantised.records.chunks(WIDTH)) {
+            for (node, records) in bvh.wide.nodes.iter().zip(quantised.records.chunks(WIDTH)) {
                 for (child, [x, y, z, _]) in node.iter().flatten().zip(records) {
                     let bounds = bvh.bounds_of(child.side);
                     let lo = world([x & 0xffff, x >> 16, y & 0xffff]);

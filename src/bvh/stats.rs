@@ -1,5 +1,6 @@
 //! Figures of a tree.
 
+use super::build::VISIT_COST;
 use super::{Bvh, Child};
 use crate::layout::MAX_LEAF_TRIANGLES;
 
@@ -25,7 +26,7 @@ impl Bvh {
             nodes: self.nodes.len(),
             leaves: 0,
             depth: self.depth,
-            sah_cost: 1.2,
+            sah_cost: VISIT_COST.into(),
             leaf_sizes: vec![0; MAX_LEAF_TRIANGLES as usize + 1],
         };
         let whole = f64::from(self.bounds.half_area()).max(f64::MIN_POSITIVE);
@@ -33,7 +34,7 @@ impl Bvh {
             for (child, bounds) in node.children.iter().zip(&node.bounds) {
                 let share = f64::from(bounds.half_area()) / whole;
                 match *child {
-                    Child::Node(_) => stats.sah_cost += 1.2 * share,
+                    Child::Node(_) => stats.sah_cost += f64::from(VISIT_COST) * share,
                     Child::Leaf { count, .. } => {
                         stats.leaf_sizes[count as usize] += 1;
                         stats.leaves += usize::from(count > 0);

@@ -27,8 +27,49 @@ pub struct WideChild {
 /// A wide node: children where there are any, those without primitives left out.
 pub type WideNode = [Option<WideChild>; WIDTH];
 
-/// See `Bvh::forest_costs`.
+/// The binary tree with up to four children a node.
+#[derive(Clone, Debug, Default)]
+pub struct Wide {
+    /// In depth-first order; node 0 is the root.
+    pub nodes: Vec<WideNode>,
+    /// Levels.
+    pub depth: u32,
+    /// Most nodes that wait on the stack of a walk.
+    pub stack: u32,
+}
+
+/// The least surface of all wide nodes at and below a binary node that becomes at most 1, 2, … children of a wide node.
 type ForestCost = [f32; WIDTH - 1];
+
+impl Wide {
+    /// Leaves those binary nodes out that make the surfaces of the rest, and so the visits of a random ray, fewest (by the
+    /// dynamic programme of Ylitie, Karras and Laine, HPG 2017).
+    pub(super) fn of(bvh: &Bvh) -> Self {
+        let costs = bvh.forest_costs();
+        let mut wide = Self { nodes: Vec::with_capacity(bvh.nodes.len() / 2), depth: 0, stack: 0 };
+        // Binary nodes that become wide ones, with the wide child that waits for the index, their level and what waits on the
+        // stack of a walk that comes to them.
+        let mut open = vec![(0, None, 1, 0)];
+        while let Some((node, parent, level, waiting)) = open.pop() {
+            let index = wide.nodes.len() as u32;
+            if let Some((parent, place)) = parent {
+                let child: &mut Option<WideChild> = &mut wide.nodes[parent as usize][place];
+                *child = child.map(|it| WideChild { child: Child::Node(index), ..it });
+            }
+            let children = bvh.children_of(node, &costs);
+            let waiting = waiting + (children.iter().flatten().count() as u32).saturating_sub(1);
+            wide.depth = wide.depth.max(level);
+            wide.stack = wide.stack.max(waiting);
+            for (place, child) in children.into_iter().enumerate().rev() {
+                if let Some(WideChild { child: Child::Node(below), .. }) = child {
+                    open.push((below, Some((index, place)), level + 1, waiting));
+                }
+            }
+            wide.nodes.push(children);
+        }
+        wide
+    }
+}
 
 impl Bvh {
     /// The box of a binary node's child.
@@ -40,36 +81,7 @@ impl Bvh {
         self.nodes[node as usize].children[usize::from(side)]
     }
 
-    /// Makes the wide nodes anew, in depth-first order: those binary nodes are left out that make the surfaces of the rest, and so
-    /// the visits of a random ray, fewest (by the dynamic programme of Ylitie, Karras and Laine, HPG 2017).
-    pub(super) fn widen(&mut self) {
-        let costs = self.forest_costs();
-        let mut wide: Vec<WideNode> = Vec::with_capacity(self.nodes.len() / 2);
-        // Binary nodes that become wide ones, with the wide child that waits for the index, their level and what waits on the
-        // stack of a walk that comes to them.
-        let mut open = vec![(0, None, 1, 0)];
-        (self.wide_depth, self.wide_stack) = (0, 0);
-        while let Some((node, parent, level, waiting)) = open.pop() {
-            let index = wide.len() as u32;
-            if let Some((parent, place)) = parent {
-                let child: &mut Option<WideChild> = &mut wide[parent as usize][place];
-                *child = child.map(|it| WideChild { child: Child::Node(index), ..it });
-            }
-            let children = self.children_of(node, &costs);
-            let waiting = waiting + (children.iter().flatten().count() as u32).saturating_sub(1);
-            self.wide_depth = self.wide_depth.max(level);
-            self.wide_stack = self.wide_stack.max(waiting);
-            for (place, child) in children.into_iter().enumerate().rev() {
-                if let Some(WideChild { child: Child::Node(below), .. }) = child {
-                    open.push((below, Some((index, place)), level + 1, waiting));
-                }
-            }
-            wide.push(children);
-        }
-        self.wide = wide;
-    }
-
-    /// For each binary node the surfaces of all wide nodes at and below it, at least, if it becomes at most 1, 2, … children of a wide node.
+    /// For each binary node.
     fn forest_costs(&self) -> Vec<ForestCost> {
         let mut costs = vec![[0.0; WIDTH - 1]; self.nodes.len()];
         // A node comes before what is below it.
@@ -142,9 +154,9 @@ mod tests {
     fn holds_what_the_binary_tree_holds() {
         for count in [1, 2, 3, 4, 5, 17, 1000] {
             let bvh = row(count);
-            let mut seen = vec![0; bvh.wide.len()];
+            let mut seen = vec![0; bvh.wide.nodes.len()];
             let mut leaves = Vec::new();
-            for (index, node) in bvh.wide.iter().enumerate() {
+            for (index, node) in bvh.wide.nodes.iter().enumerate() {
                 assert!(count < 4 || node.iter().flatten().count() >= 2, "{count}: node {index} is nearly empty");
                 for WideChild { side, child } in node.iter().flatten() {
                     match *child {
@@ -152,7 +164,7 @@ mod tests {
                             assert!(below as usize > index);
                             seen[below as usize] += 1;
                             let around = |child: &WideChild| bvh.bounds_of(child.side);
-                            for inner in bvh.wide[below as usize].iter().flatten().map(around) {
+                            for inner in bvh.wide.nodes[below as usize].iter().flatten().map(around) {
                                 assert_eq!(bvh.bounds_of(*side).union(inner), *bvh.bounds_of(*side));
                             }
                         }
@@ -169,7 +181,7 @@ mod tests {
     #[test]
     fn has_half_the_levels() {
         let bvh = row(1024);
-        assert!(bvh.wide_depth <= bvh.depth.div_ceil(2) + 1, "{} of {}", bvh.wide_depth, bvh.depth);
-        assert!(bvh.wide.len() < bvh.nodes.len() / 2);
+        assert!(bvh.wide.depth <= bvh.depth.div_ceil(2) + 1, "{} of {}", bvh.wide.depth, bvh.depth);
+        assert!(bvh.wide.nodes.len() < bvh.nodes.len() / 2);
     }
 }

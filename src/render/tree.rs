@@ -189,7 +189,7 @@ impl Tree {
     pub fn features(&self, features: Features) -> Features {
         let instances = features.instances || self.upper.is_some();
         // One is the mark where an instance was entered.
-        let entries = self.deepest(|bvh| bvh.wide_stack) + u32::from(instances);
+        let entries = self.deepest(|bvh| bvh.wide.stack) + u32::from(instances);
         Features { deep_tree: features.deep_tree || entries > STACK_REGISTERS, instances, ..features }
     }
 
@@ -197,7 +197,7 @@ impl Tree {
     pub fn size(&self) -> TreeSize {
         let parts = self.parts.iter().map(|part| &part.bvh);
         TreeSize {
-            nodes: parts.clone().chain(&self.upper).map(|bvh| bvh.wide.len()).sum(),
+            nodes: parts.clone().chain(&self.upper).map(|bvh| bvh.wide.nodes.len()).sum(),
             triangles: parts.map(|bvh| bvh.order.len()).sum(),
             instances: self.upper.as_ref().map_or(0, |upper| upper.order.len()),
         }
@@ -217,13 +217,13 @@ impl Tree {
         }
         let bvh = &self.parts.first()?.bvh;
         // A round each for the nodes and leaves, and, as each ray of a subgroup may be in another leaf, one for each triangle and ray.
-        let mut rounds = vec![0_u64; bvh.wide.len()];
+        let mut rounds = vec![0_u64; bvh.wide.nodes.len()];
         let of_child = |rounds: &[u64], child: Child| match child {
             Child::Node(index) => rounds[index as usize],
             Child::Leaf { count, .. } => 1 + u64::from(count) * LANES,
         };
-        let children = |index: usize| bvh.wide[index].iter().flatten().map(|wide| wide.child);
-        for index in (0..bvh.wide.len()).rev() {
+        let children = |index: usize| bvh.wide.nodes[index].iter().flatten().map(|wide| wide.child);
+        for index in (0..bvh.wide.nodes.len()).rev() {
             rounds[index] = 1 + children(index).map(|child| of_child(&rounds, child)).sum::<u64>();
         }
         let mut parts = Vec::new();
@@ -246,7 +246,7 @@ impl Tree {
         let nodes = self.size().nodes;
         report::Tree {
             nodes,
-            depth: self.deepest(|bvh| bvh.wide_depth),
+            depth: self.deepest(|bvh| bvh.wide.depth),
             sah_cost: root.map_or(0.0, |stats| stats.sah_cost),
             bytes: 16 * u64::from(NODE_TEXELS) * nodes as u64,
             update: self.update,

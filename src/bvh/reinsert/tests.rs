@@ -1,7 +1,7 @@
 //! Trees get cheaper and stay valid.
 
 use super::*;
-use crate::bvh::{Aabb, Bvh, Child, Quality};
+use crate::bvh::{Aabb, Bvh, Child, Quality, Wide};
 use glam::Vec3;
 
 /// Half area of all inner nodes but the root.
@@ -78,6 +78,7 @@ fn a_subtree_does_not_go_deeper_than_a_tree_may() {
     nodes[63] = Node { bounds: [cube(0.3), cube(0.25)], children: [leaf(65), leaf(3)] };
     nodes.push(Node { bounds: [cube(0.1), cube(0.2)], children: [leaf(0), leaf(1)] });
     let order = (0..66).collect();
-    let share = share_left(&boxes, &Bvh { nodes, order, bounds: cube(64.0), depth: MAX_TREE_DEPTH });
+    let share =
+        share_left(&boxes, &Bvh { nodes, order, bounds: cube(64.0), depth: MAX_TREE_DEPTH, wide: Wide::default() });
     assert!(share < 1.0, "{share}");
 }
