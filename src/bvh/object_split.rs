@@ -83,7 +83,7 @@ impl ObjectSplit {
     pub fn partition(&self, references: &mut [Reference]) -> usize {
         match self.place {
             Place::Sorted(left) => {
-                sort(references, self.axis);
+                references.sort_by_key(|reference| key(reference, self.axis));
                 left
             }
             Place::Binned { binning, last_left } => {
@@ -102,28 +102,34 @@ impl ObjectSplit {
     }
 }
 
-fn sort(references: &mut [Reference], axis: usize) {
-    let key = |reference: &Reference| reference.doubled_center()[axis];
-    references.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.primitive().cmp(&b.primitive())));
+/// What a reference is sorted by: its centre, then its primitive, as one number.
+fn key(reference: &Reference, axis: usize) -> u64 {
+    let bits = reference.doubled_center()[axis].to_bits();
+    // Floats in order as unsigned integers: negative ones turned round, below the others.
+    let ordered = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
+    u64::from(ordered) << 32 | u64::from(reference.primitive())
 }
 
 fn sweep(references: &[Reference]) -> Option<ObjectSplit> {
     let count = references.len();
-    let mut sorted = [Reference::NONE; SWEEP];
-    let sorted = &mut sorted[..count];
-    sorted.copy_from_slice(references);
+    let mut keys = [(0, 0); SWEEP];
+    let keys = &mut keys[..count];
     let mut best: Option<ObjectSplit> = None;
     for axis in 0..3 {
-        sort(sorted, axis);
+        for ((slot, reference), index) in keys.iter_mut().zip(references).zip(0_usize..) {
+            *slot = (key(reference, axis), index);
+        }
+        keys.sort_unstable();
+        let bounds = |index: usize| references[keys[index].1].bounds();
         let mut right = [Box4::EMPTY; SWEEP];
         let mut side = Box4::EMPTY;
         for index in (1..count).rev() {
-            side = side.union(&sorted[index].bounds());
+            side = side.union(&bounds(index));
             right[index] = side;
         }
         let mut left = Box4::EMPTY;
         for index in 1..count {
-            left = left.union(&sorted[index - 1].bounds());
+            left = left.union(&bounds(index - 1));
             let cost = left.half_area() * index as f32 + right[index].half_area() * (count - index) as f32;
             if best.is_none_or(|best| cost < best.cost) {
                 let overlap = left.intersection(&right[index]).half_area();

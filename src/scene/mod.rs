@@ -41,6 +41,7 @@ pub use material::{AlphaMode, Material, Whitted};
 pub use mipmap::Mipmaps;
 pub use precedence::precedence;
 pub use sampling::{Filter, Sampler};
+pub(crate) use soup::bounds_of;
 pub use soup::{Instancing, Placement, Soup, TriangleFlags};
 pub use texture::{Map, Maps, Minify, Texture, UsedMap, Wrap};
 pub use view::{View, MAX_SAMPLES};

@@ -5,6 +5,7 @@ use super::{Instance, Mesh, Scene};
 use crate::error::{Error, Result};
 use crate::layout::MATERIAL_BITS;
 use glam::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// What is known of a triangle besides its corners.
@@ -158,10 +159,7 @@ impl Soup {
             not_finite += added.not_finite;
             flattened[instance.mesh] += usize::from(added.flattened);
         }
-        for point in soup.positions.iter().flatten() {
-            soup.lo = soup.lo.min(*point);
-            soup.hi = soup.hi.max(*point);
-        }
+        (soup.lo, soup.hi) = bounds_of(&soup.positions);
         let own = soup.positions.len();
         if own > 0 || !shared.contains(&true) {
             soup.parts.push(0..own);
@@ -252,51 +250,53 @@ impl Soup {
             world.try_normalize().unwrap_or(DVec3::ZERO).as_vec3()
         };
         let points: Vec<DVec3> =
-            mesh.positions.iter().map(|p| instance.world_from_object.transform_point3(p.as_dvec3())).collect();
-        let normals: Vec<Vec3> = mesh.normals.iter().map(world_normal).collect();
+            mesh.positions.par_iter().map(|p| instance.world_from_object.transform_point3(p.as_dvec3())).collect();
+        let normals: Vec<Vec3> = mesh.normals.par_iter().map(world_normal).collect();
         // A tangent lies in the surface and moves with it; a mirroring transform turns the bitangent round.
         let world_tangent = |tangent: Vec4| {
             let world = (linear * tangent.truncate().as_dvec3()).try_normalize().unwrap_or(DVec3::ZERO);
             world.as_vec3().extend(tangent.w * determinant.signum() as f32)
         };
-        let material = &scene.materials[mesh.material];
-        let mut not_finite = 0;
-        for (index, corners) in mesh.triangles.iter().enumerate() {
-            let places = if determinant < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
-            let corners = places.map(|place: usize| corners[place] as usize);
-            let positions = corners.map(|corner| points[corner]);
-            if !positions.iter().all(|point| point.is_finite() && point.abs().max_element() < 1e30) {
-                not_finite += 1;
-                continue;
-            }
-            self.positions.push(positions);
-            self.materials.push(mesh.material as u32);
-            // A normal without a direction makes the whole triangle flat.
-            let corner_normals =
-                if normals.is_empty() { [Vec3::ZERO; 3] } else { corners.map(|corner| normals[corner]) };
-            let is_smooth = corner_normals.iter().all(|normal| normal.length_squared() > 0.5);
-            if smooth {
-                self.normals.push(corner_normals);
-            }
-            if colored {
-                let white = mesh.colors.is_empty();
-                self.colors.push(corners.map(|corner| if white { Vec4::ONE } else { mesh.colors[corner] }));
-            }
-            if textured {
-                self.texcoords.push(corners.map(|corner| mesh.texcoords.get(corner).copied().unwrap_or_default()));
-            }
-            if tangents {
-                let own = mesh.tangents.get(index).copied().unwrap_or_default();
-                self.tangents.push(places.map(|place| world_tangent(own[place])));
-            }
-            self.flags.push(TriangleFlags {
-                single_sided: !material.double_sided,
-                smooth: is_smooth,
-                colored: !mesh.colors.is_empty(),
-                see_through: material.is_see_through(),
-            });
+        let places = if determinant < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
+        let can_be_drawn = |point: &DVec3| point.is_finite() && point.abs().max_element() < 1e30;
+        let are_all_drawn = points.par_iter().all(can_be_drawn);
+        let is_drawn =
+            |corners: &[u32; 3]| are_all_drawn || corners.iter().all(|corner| can_be_drawn(&points[*corner as usize]));
+        let drawn: Vec<usize> =
+            (0..mesh.triangles.len()).into_par_iter().filter(|index| is_drawn(&mesh.triangles[*index])).collect();
+        let corners = |index: &usize| places.map(|place: usize| mesh.triangles[*index][place] as usize);
+        // A normal without a direction makes the whole triangle flat.
+        let corner_normals = |index: &usize| match normals.is_empty() {
+            true => [Vec3::ZERO; 3],
+            false => corners(index).map(|corner| normals[corner]),
+        };
+        let is_smooth = |normals: [Vec3; 3]| normals.iter().all(|normal| normal.length_squared() > 0.5);
+        self.positions.par_extend(drawn.par_iter().map(|index| corners(index).map(|corner| points[corner])));
+        self.materials.extend(drawn.iter().map(|_| mesh.material as u32));
+        if smooth {
+            self.normals.par_extend(drawn.par_iter().map(corner_normals));
         }
-        Added { flattened: false, not_finite }
+        if colored {
+            let color = |corner: usize| mesh.colors.get(corner).copied().unwrap_or(Vec4::ONE);
+            self.colors.par_extend(drawn.par_iter().map(|index| corners(index).map(color)));
+        }
+        if textured {
+            let texcoord = |corner: usize| mesh.texcoords.get(corner).copied().unwrap_or_default();
+            self.texcoords.par_extend(drawn.par_iter().map(|index| corners(index).map(texcoord)));
+        }
+        if tangents {
+            let own = |index: &usize| mesh.tangents.get(*index).copied().unwrap_or_default();
+            self.tangents
+                .par_extend(drawn.par_iter().map(|index| places.map(|place| world_tangent(own(index)[place]))));
+        }
+        let material = &scene.materials[mesh.material];
+        self.flags.par_extend(drawn.par_iter().map(|index| TriangleFlags {
+            single_sided: !material.double_sided,
+            smooth: is_smooth(corner_normals(index)),
+            colored: !mesh.colors.is_empty(),
+            see_through: material.is_see_through(),
+        }));
+        Added { flattened: false, not_finite: mesh.triangles.len() - drawn.len() }
     }
 
     /// The first part holds what stands alone, in world space.
@@ -358,6 +358,15 @@ impl Attributes {
     fn count(&self) -> usize {
         [self.smooth, self.colored, self.textured, self.tangents].into_iter().filter(|has| *has).count()
     }
+}
+
+/// The box around triangles; its corners are infinite where there is none.
+pub(crate) fn bounds_of(triangles: &[[DVec3; 3]]) -> (DVec3, DVec3) {
+    let none = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let with_point = |(lo, hi): (DVec3, DVec3), point: &DVec3| (lo.min(*point), hi.max(*point));
+    let with_triangle = |bounds, triangle: &[DVec3; 3]| triangle.iter().fold(bounds, with_point);
+    let both = |(lo, hi): (DVec3, DVec3), other: (DVec3, DVec3)| (lo.min(other.0), hi.max(other.1));
+    triangles.par_iter().fold(none, with_triangle).reduce(none, both)
 }
 
 /// The corners of the box around points.
