@@ -46,7 +46,7 @@ pub mod kernels {
 /// How the device reaches a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BindingKind {
-    /// Read-only `uvec4` texels: a uniform texel buffer, or a storage buffer where texel buffers are too small.
+    /// Read-only `uvec4` texels: a storage texel buffer on software Vulkan, a storage buffer elsewhere.
     Fetch,
     /// A storage buffer.
     Storage,
