@@ -2,7 +2,7 @@
 //! dispatches of its kernels on a device of their own. To see compilation, switch the driver's own cache off:
 //! `MESA_SHADER_CACHE_DISABLE=true cargo bench --bench features`.
 
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::print_stdout, clippy::unwrap_used)]
 
 use glam::{DMat4, DVec3, Vec4};
 use glimt::scene::{shapes, AlphaMode, Background, CameraChoice, Instance, Instancing, Light, Material, Mesh, Whitted};

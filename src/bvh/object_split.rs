@@ -128,11 +128,11 @@ fn sweep(references: &[Reference]) -> Option<ObjectSplit> {
             right[index] = side;
         }
         let mut left = Box4::EMPTY;
-        for index in 1..count {
+        for (index, right) in right[..count].iter().enumerate().skip(1) {
             left = left.union(&bounds(index - 1));
-            let cost = left.half_area() * index as f32 + right[index].half_area() * (count - index) as f32;
+            let cost = left.half_area() * index as f32 + right.half_area() * (count - index) as f32;
             if best.is_none_or(|best| cost < best.cost) {
-                let overlap = left.intersection(&right[index]).half_area();
+                let overlap = left.intersection(right).half_area();
                 best = Some(ObjectSplit { cost, overlap, axis, place: Place::Sorted(index) });
             }
         }

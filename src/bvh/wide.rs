@@ -178,6 +178,53 @@ mod tests {
         }
     }
 
+    /// Boxes of many sizes all over a cube.
+    fn cloud(count: u32) -> Bvh {
+        let noise = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8).wrapping_mul(0x9e37_79b1) as f32 / u32::MAX as f32;
+        let at = |i: u32| Vec3::new(noise(3 * i), noise(3 * i + 1), noise(3 * i + 2));
+        let boxes: Vec<Aabb> =
+            (0..count).map(|i| Aabb { lo: at(i), hi: at(i) + at(i + count) * noise(i).powi(8) }).collect();
+        Bvh::over_boxes(&boxes, 1)
+    }
+
+    /// Half area of all wide nodes.
+    fn surface(bvh: &Bvh) -> f32 {
+        let own = |node: &WideNode| {
+            let boxes = node.iter().flatten().map(|child| bvh.bounds_of(child.side));
+            boxes.fold(Aabb::EMPTY, |all, child| all.union(child)).half_area()
+        };
+        bvh.wide.nodes.iter().map(own).sum()
+    }
+
+    #[test]
+    fn surfaces_are_as_small_as_was_found_and_smaller_than_with_the_largest_child_replaced() {
+        let bvh = cloud(5000);
+        let found = bvh.forest_costs()[0][0];
+        assert!((surface(&bvh) / found - 1.0).abs() < 1e-3, "{} {found}", surface(&bvh));
+        // The same, top down: the child with the largest surface gives way to its children.
+        let mut greedy = 0.0;
+        let mut open = vec![0];
+        while let Some(node) = open.pop() {
+            let [left, right] = bvh.nodes[node as usize].bounds;
+            greedy += left.union(&right).half_area();
+            let mut four = [0, 1].map(|side| Side { node, side }).to_vec();
+            while four.len() < WIDTH {
+                let is_node = |place: &usize| matches!(bvh.child_of(four[*place]), Child::Node(_));
+                let area = |place: &usize| bvh.bounds_of(four[*place]).half_area();
+                let Some(largest) = (0..four.len()).filter(is_node).max_by(|a, b| area(a).total_cmp(&area(b))) else {
+                    break;
+                };
+                let Child::Node(below) = bvh.child_of(four.swap_remove(largest)) else { break };
+                four.extend([0, 1].map(|side| Side { node: below, side }));
+            }
+            open.extend(four.into_iter().filter_map(|side| match bvh.child_of(side) {
+                Child::Node(below) => Some(below),
+                Child::Leaf { .. } => None,
+            }));
+        }
+        assert!(found < 0.99 * greedy, "{found} {greedy}");
+    }
+
     #[test]
     fn has_half_the_levels() {
         let bvh = row(1024);
