@@ -149,6 +149,17 @@ mod tests {
         Bvh::over_boxes(&boxes, 1)
     }
 
+    /// Levels at and below a wide node, and the most that waits on a stack there.
+    fn deepest(bvh: &Bvh, node: u32) -> (u32, u32) {
+        let children: Vec<Child> = bvh.wide.nodes[node as usize].iter().flatten().map(|wide| wide.child).collect();
+        let below = children.iter().filter_map(|child| match child {
+            Child::Node(below) => Some(deepest(bvh, *below)),
+            Child::Leaf { .. } => None,
+        });
+        let (levels, waiting) = below.fold((0, 0), |all, one| (all.0.max(one.0), all.1.max(one.1)));
+        (levels + 1, waiting + children.len() as u32 - 1)
+    }
+
     /// Each primitive is below the root once, in a box that holds it, and each node is met once, after its parent.
     #[test]
     fn holds_what_the_binary_tree_holds() {
@@ -172,6 +183,7 @@ mod tests {
                     }
                 }
             }
+            assert_eq!((bvh.wide.depth, bvh.wide.stack), deepest(&bvh, 0));
             leaves.sort_unstable();
             assert_eq!(leaves, (0..count as u32).collect::<Vec<_>>());
             assert!(seen[1..].iter().all(|times| *times == 1) && seen[0] == 0, "{seen:?}");
