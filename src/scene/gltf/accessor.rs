@@ -5,9 +5,12 @@ use crate::error::Result;
 use ::gltf::json::accessor::{ComponentType, Type};
 use ::gltf::json::{buffer, validation::Checked, Index};
 use glam::{DMat4, Mat4};
+use rayon::prelude::*;
 
 /// Most elements of an accessor that no buffer view backs: there the count alone decides what is allocated.
 const MOST_UNBACKED: u64 = 1 << 20;
+/// Elements that one thread reads at once.
+const AT_ONCE: usize = 1 << 14;
 /// Most numbers that all meshes and textures of a document are made of, unless something else is asked for: 2 GiB. Many primitives may name the same
 /// bytes.
 pub(super) const MOST_NUMBERS: u64 = 1 << 29;
@@ -137,7 +140,12 @@ impl Document<'_> {
         self.read(index, 0.0, |kind, bytes| number(kind, normalized, bytes)).ok()
     }
 
-    fn read<T: Copy>(&self, index: usize, zero: T, convert: impl Fn(ComponentType, &[u8]) -> T) -> Result<Elements<T>> {
+    fn read<T: Copy + Send + Sync>(
+        &self,
+        index: usize,
+        zero: T,
+        convert: impl Fn(ComponentType, &[u8]) -> T + Sync,
+    ) -> Result<Elements<T>> {
         let accessor = &self.root.accessors[index];
         let refuse = |message: &str| self.refuse(format!("accessors[{index}]: {message}"));
         let (Checked::Valid(kind), Checked::Valid(shape)) = (&accessor.component_type, &accessor.type_) else {
@@ -154,11 +162,15 @@ impl Document<'_> {
                 let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
                 let layout = self.layout(index, view, offset, accessor.count.0, element)?;
                 let count = accessor.count.0 as usize;
-                let mut values = Vec::with_capacity(count * components);
-                for start in (0..count).map(|i| i * layout.stride) {
-                    let bytes = &layout.bytes[start..start + element];
-                    values.extend(bytes.chunks_exact(kind.size()).map(|component| convert(kind, component)));
-                }
+                let mut values = vec![zero; count * components];
+                values.par_chunks_mut(AT_ONCE * components).enumerate().for_each(|(chunk, values)| {
+                    for (i, values) in values.chunks_exact_mut(components).enumerate() {
+                        let bytes = &layout.bytes[(chunk * AT_ONCE + i) * layout.stride..][..element];
+                        for (value, component) in values.iter_mut().zip(bytes.chunks_exact(kind.size())) {
+                            *value = convert(kind, component);
+                        }
+                    }
+                });
                 values
             }
             None if accessor.count.0 > MOST_UNBACKED => return Err(refuse("it has no data for so many elements")),
