@@ -13,7 +13,7 @@ const int NOTHING = int(0x80000000);
 /// On the stack where an instance was entered: back to the world.
 const int LEAVE = int(0x80000001);
 const int REGISTERS = int(STACK_REGISTERS);
-/// A node that no tree has. Every loop here also ends at it, see check_complete.
+/// A node that no tree has. Every loop here also ends at it, see is_complete.
 const int IMPOSSIBLE = 0x7fffffff;
 
 /// The ray in grid coordinates, where a child's u16 box is compared without decoding it.
