@@ -2,7 +2,7 @@
 
 use super::documents::{message, read, Builder, TRIANGLE};
 use glam::{DVec3, Vec3};
-use glimt::scene::{gltf, LightKind, Projection};
+use glimt::scene::{gltf, LightKind, Projection, Soup};
 use glimt::{Result, Scene};
 use serde_json::{json, Value};
 
@@ -318,4 +318,24 @@ fn unlit_is_the_base_color_alone() {
         "materials": [{"emissiveFactor": [0, 1, 0], "extensions": {"KHR_materials_unlit": {}}}]});
     let scene = read(&builder.document(json!({"attributes": {"POSITION": positions}, "material": 0}), more)).unwrap();
     assert!(scene.materials[0].unlit && scene.materials[0].emission == DVec3::ZERO);
+}
+
+#[test]
+fn many_elements_are_read_in_their_order() {
+    // More than one thread reads at once, with a stride; some triangles are dropped on the way into the soup.
+    let count = 50_001;
+    let point = |i: usize| if i % 30_000 == 7 { [f32::MAX; 3] } else { [i as f32, -(i as f32), (i % 17) as f32] };
+    let bytes: Vec<u8> = (0..count).flat_map(|i| [point(i), [9.0; 3]]).flatten().flat_map(f32::to_le_bytes).collect();
+    let mut builder = Builder::default();
+    let view = builder.view(&bytes, Some(24));
+    let positions =
+        builder.accessor(json!({"bufferView": view, "componentType": 5126, "type": "VEC3", "count": count}));
+    let scene = read(&builder.document(json!({"attributes": {"POSITION": positions}}), json!({}))).unwrap();
+    let own: Vec<[f32; 3]> = scene.meshes[0].positions.iter().map(|position| position.to_array()).collect();
+    assert_eq!(own, (0..count).map(point).collect::<Vec<_>>());
+    let soup = Soup::of(&scene).unwrap();
+    let drawn = (0..count / 3).filter(|triangle| (0..3).all(|corner| point(3 * triangle + corner)[0] < 1e30));
+    let expected = drawn.map(|triangle| [0, 1, 2].map(|corner| Vec3::from(point(3 * triangle + corner)).as_dvec3()));
+    assert_eq!(soup.positions, expected.collect::<Vec<_>>());
+    assert_eq!(soup.len(), count / 3 - 2, "two triangles have a corner that is too far away");
 }

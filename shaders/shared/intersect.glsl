@@ -113,8 +113,8 @@ bool is_met(uint primitive, uint word, vec2 barycentrics, bool any, inout Hit hi
     return max(hit.passed.r, max(hit.passed.g, hit.passed.b)) < NO_LIGHT;
 }
 
-/// Takes the triangle, which begins at `first` of all texels, as the new hit if it is nearer than the old one. Where `any` hit will do, backs count too. A ray for which that cannot
-/// be decided is `uncertain`.
+/// Takes the triangle, whose texels begin at `first`, as the new hit if it is nearer than the old one. Where `any` hit will do,
+/// backs count too. A ray for which that cannot be decided is `uncertain`.
 bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance, bool any, inout Hit hit,
                         inout bool uncertain) {
     uvec4 texel_a = FETCH(triangles, first);

@@ -154,8 +154,8 @@ bool is_complete(int node, bool cut) {
     return node == NOTHING && !cut;
 }
 
-/// The walk through a subtree with an array for a stack, with room for three siblings on each level of any two trees. The host looks at the count of those that
-/// are cut short even so: a wrong picture is never written.
+/// The walk through a subtree with an array for a stack, with room for three siblings on each level of any two trees. The host
+/// looks at the count of those that are cut short even so: a wrong picture is never written.
 void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
     int stack[2u * 3u * MAX_TREE_DEPTH + 1u];
     int height = 0;

@@ -177,3 +177,20 @@ fn binned(references: &[Reference], centers: &Box4) -> Option<ObjectSplit> {
     }
     best
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn keys_are_in_the_order_of_centres_then_of_primitives() {
+        let centers = [f32::MIN, -2.0, -1e-40, 0.0, 1e-40, 2.0, 3.0e38];
+        let keys: Vec<u64> = centers
+            .iter()
+            .flat_map(|center| [3, 8].map(|primitive| (Vec3::splat(center / 2.0), primitive)))
+            .map(|(center, primitive)| key(&Reference::new(center, center, primitive), 1))
+            .collect();
+        assert!(keys.is_sorted() && keys.windows(2).all(|two| two[0] != two[1]), "{keys:x?}");
+    }
+}

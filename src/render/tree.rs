@@ -7,7 +7,7 @@
 use crate::bvh::{quantise, reference, Aabb, Bvh, Child, Grid, Quality, WIDTH};
 use crate::layout::{Features, Instance, LEAF_IS_INSTANCE, NODE_TEXELS, STACK_REGISTERS};
 use crate::report;
-use crate::scene::{bounds_of, Placement, Projection, Soup, View};
+use crate::scene::{bounds_of, box_corners, Placement, Projection, Soup, View};
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -51,7 +51,7 @@ impl Part {
 pub(super) fn part_space(soup: &Soup, range: &std::ops::Range<usize>, world: Rebase) -> (Vec<[Vec3; 3]>, Rebase) {
     let positions = &soup.positions[range.clone()];
     let own = || {
-        let (lo, hi) = if positions.is_empty() { Default::default() } else { bounds_of(positions) };
+        let (lo, hi) = if positions.is_empty() { Default::default() } else { bounds_of(positions.as_flattened()) };
         Rebase::new(lo, hi, (lo + hi) / 2.0)
     };
     let rebase = if soup.is_flat() { world } else { own() };
@@ -317,13 +317,6 @@ impl Tree {
         device.instances = upper.order.par_iter().map(instance).collect();
         device
     }
-}
-
-fn box_corners(lo: DVec3, hi: DVec3) -> [DVec3; 8] {
-    std::array::from_fn(|corner| {
-        let pick = |bit: usize, lo, hi| if corner >> bit & 1 == 0 { lo } else { hi };
-        DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z))
-    })
 }
 
 /// The box of an instance in the device's world, rounded outward.

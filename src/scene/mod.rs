@@ -10,6 +10,7 @@
 
 mod account;
 mod background;
+mod bounds;
 mod builtin;
 mod camera;
 mod dice;
@@ -23,6 +24,7 @@ mod mipmap;
 mod precedence;
 mod sampling;
 pub mod shapes;
+mod sharing;
 mod soup;
 mod srgb;
 mod tangents;
@@ -33,6 +35,7 @@ mod view;
 pub use self::image::{Image, Pixels};
 pub use account::{ExtensionUse, Standing};
 pub use background::Background;
+pub(crate) use bounds::{bounds_of, box_corners};
 pub use builtin::{built_in, BUILT_IN};
 pub use camera::{Camera, CameraChoice, Projection};
 pub use light::{Light, LightKind};
@@ -41,8 +44,8 @@ pub use material::{AlphaMode, Material, Whitted};
 pub use mipmap::Mipmaps;
 pub use precedence::precedence;
 pub use sampling::{Filter, Sampler};
-pub(crate) use soup::bounds_of;
-pub use soup::{Instancing, Placement, Soup, TriangleFlags};
+pub use sharing::Instancing;
+pub use soup::{Placement, Soup, TriangleFlags};
 pub use texture::{Map, Maps, Minify, Texture, UsedMap, Wrap};
 pub use view::{View, MAX_SAMPLES};
 

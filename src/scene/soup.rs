@@ -1,6 +1,8 @@
 //! The triangle soup: every instance's triangles in world space, or, where many instances share a mesh, its triangles once and
 //! the places where they stand.
 
+use super::bounds::{bounds_of, box_corners};
+use super::sharing::{is_flat, shared_meshes, Instancing};
 use super::{Instance, Mesh, Scene};
 use crate::error::{Error, Result};
 use crate::layout::MATERIAL_BITS;
@@ -28,18 +30,6 @@ pub struct Placement {
     pub part: usize,
     /// Space of the part's positions to world space.
     pub world_from_part: DMat4,
-}
-
-/// Whether instances share the triangles of their mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Instancing {
-    /// Where that saves much memory: rays through shared meshes take longer.
-    #[default]
-    Auto,
-    /// Wherever that saves any memory.
-    Shared,
-    /// Never: every instance has its own triangles.
-    Flat,
 }
 
 /// Triangles of all instances, in the order of instances and their meshes. A triangle's number is its *primitive*.
@@ -89,14 +79,6 @@ const SIZES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 /// larger than what is in it.
 const MOST_PLACED_POINTS: usize = 1 << 31;
 
-/// Bytes that a triangle takes on the device: corners and its share of the tree; one of its attributes.
-const TRIANGLE_BYTES: usize = 48 + 16;
-const ATTRIBUTE_BYTES: usize = 48;
-/// Bytes that an instance takes on the device: its transforms and its share of the upper tree.
-const INSTANCE_BYTES: usize = 128 + 32;
-/// Bytes that sharing must save before rays are made to pay for it.
-const WORTH_SHARING: usize = 64 << 20;
-
 /// What became of an instance.
 struct Added {
     /// Its transform has no volume: nothing of it was added.
@@ -127,7 +109,7 @@ impl Soup {
             textured: used().any(|mesh| scene.materials[mesh.material].drawn_maps().any()),
             tangents: used().any(|mesh| scene.materials[mesh.material].drawn_maps().normal.is_some()),
         };
-        let shared = shared_meshes(scene, instancing, attributes);
+        let shared = shared_meshes(scene, instancing, attributes.count());
         let is_own = |instance: &&Instance| !shared[instance.mesh];
         let triangles = |mesh: &Mesh| mesh.triangles.len();
         let count = scene.instances.iter().filter(is_own).map(|own| triangles(&scene.meshes[own.mesh])).sum::<usize>()
@@ -159,7 +141,7 @@ impl Soup {
             not_finite += added.not_finite;
             flattened[instance.mesh] += usize::from(added.flattened);
         }
-        (soup.lo, soup.hi) = bounds_of(&soup.positions);
+        (soup.lo, soup.hi) = bounds_of(soup.positions.as_flattened());
         let own = soup.positions.len();
         if own > 0 || !shared.contains(&true) {
             soup.parts.push(0..own);
@@ -211,7 +193,8 @@ impl Soup {
         points.sort_by(|a, b| a.to_array().map(f64::to_bits).cmp(&b.to_array().map(f64::to_bits)));
         points.dedup();
         if points.len().saturating_mul(places.len()) > MOST_PLACED_POINTS {
-            points = box_corners(&points);
+            let (lo, hi) = bounds_of(&points);
+            points = box_corners(lo, hi).to_vec();
         }
         for world_from_part in places.iter().copied() {
             if is_flat(&world_from_part) {
@@ -358,49 +341,4 @@ impl Attributes {
     fn count(&self) -> usize {
         [self.smooth, self.colored, self.textured, self.tangents].into_iter().filter(|has| *has).count()
     }
-}
-
-/// The box around triangles; its corners are infinite where there is none.
-pub(crate) fn bounds_of(triangles: &[[DVec3; 3]]) -> (DVec3, DVec3) {
-    let none = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let with_point = |(lo, hi): (DVec3, DVec3), point: &DVec3| (lo.min(*point), hi.max(*point));
-    let with_triangle = |bounds, triangle: &[DVec3; 3]| triangle.iter().fold(bounds, with_point);
-    let both = |(lo, hi): (DVec3, DVec3), other: (DVec3, DVec3)| (lo.min(other.0), hi.max(other.1));
-    triangles.par_iter().fold(none, with_triangle).reduce(none, both)
-}
-
-/// The corners of the box around points.
-fn box_corners(points: &[DVec3]) -> Vec<DVec3> {
-    let lo = points.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-    let hi = points.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-    let corner =
-        |i: usize| DVec3::from_array(std::array::from_fn(|axis| if i >> axis & 1 == 0 { lo[axis] } else { hi[axis] }));
-    (0..8).map(corner).collect()
-}
-
-/// The transform has no volume.
-fn is_flat(world_from_object: &DMat4) -> bool {
-    let determinant = DMat3::from_mat4(*world_from_object).determinant();
-    determinant == 0.0 || !determinant.is_finite()
-}
-
-/// Which meshes are to be shared.
-fn shared_meshes(scene: &Scene, instancing: Instancing, attributes: Attributes) -> Vec<bool> {
-    let mut instances = vec![0_usize; scene.meshes.len()];
-    let mut may_share = vec![instancing != Instancing::Flat; scene.meshes.len()];
-    for instance in &scene.instances {
-        instances[instance.mesh] += usize::from(!is_flat(&instance.world_from_object));
-        // Positions that overflow are dropped one by one, which needs them one by one.
-        let elements = instance.world_from_object.to_cols_array();
-        may_share[instance.mesh] &= elements.iter().all(|element| element.abs() < 1e12);
-    }
-    let triangle = TRIANGLE_BYTES + ATTRIBUTE_BYTES * attributes.count();
-    let saved = |mesh: usize| {
-        let (bytes, count) = (scene.meshes[mesh].triangles.len() * triangle, instances[mesh]);
-        (bytes * count).saturating_sub(bytes + count * INSTANCE_BYTES)
-    };
-    let all_saved: usize = (0..scene.meshes.len()).filter(|mesh| may_share[*mesh]).map(saved).sum();
-    let worth = instancing == Instancing::Shared
-        || (all_saved > WORTH_SHARING && all_saved > scene.triangle_count() * triangle / 2);
-    (0..scene.meshes.len()).map(|mesh| worth && may_share[mesh] && instances[mesh] > 1 && saved(mesh) > 0).collect()
 }
