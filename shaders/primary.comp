@@ -46,7 +46,7 @@ void main() {
     Ray ray = camera_ray(vec2(place) + inside);
     Hit hit = hit_so_far(thread, FAR);
     if (!traverse(ray, false, hit)) {
-        retrace_queue[queue_append(QUEUE_RETRACE)] = sample_index;
+        trace_again(sample_index, AGAIN_PRIMARY);
         return;
     }
     if (!is_last_part(thread, hit))

@@ -10,7 +10,7 @@
 void main() {
     uint pixel = gl_GlobalInvocationID.x;
     // Rays that nobody has traced again: the host runs the wave once more.
-    bool is_incomplete = counters[COUNTER_FILLING + QUEUE_RETRACE] + counters[COUNTER_LOST] != 0u;
+    bool is_incomplete = ((counters[COUNTER_AGAIN] & ~step_now.again) | counters[COUNTER_LOST]) != 0u;
     if (pixel >= step_now.pixels || is_incomplete)
         return;
     uvec2 place = pixel_place(step_now.first_pixel + pixel);

@@ -16,7 +16,7 @@ void main() {
     RayItem item = ray_item(FETCH(shadow_items, index * ITEM_TEXELS), FETCH(shadow_items, index * ITEM_TEXELS + 1u));
     Hit hit = hit_so_far(thread, item.distance);
     if (!traverse(Ray(item.origin, item.direction), true, hit)) {
-        retrace_queue[queue_append(QUEUE_RETRACE)] = index;
+        trace_again(index, AGAIN_SHADOW);
         return;
     }
     if (!is_last_part(thread, hit))

@@ -22,6 +22,7 @@ fn without_its_safeguard_a_case_fails() {
     let pairs = [
         ("self-hit", Sabotage::FixedEpsilon),
         ("leaks", Sabotage::MollerTrumbore),
+        ("self-hit", Sabotage::SureOfThin),
         ("leaks", Sabotage::TightBoxes),
         ("far-away", Sabotage::NoRebase),
         ("radiance", Sabotage::PlainSums),

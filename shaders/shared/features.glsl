@@ -19,7 +19,7 @@ layout(constant_id = 6) const bool MULTISAMPLING = true;
 layout(constant_id = 7) const bool DEEP_TREE = true;
 /// Instances share meshes: an upper tree over instances, whose leaves are trees over the triangles of a mesh.
 layout(constant_id = 8) const bool INSTANCES = true;
-/// The kernel traces again what overflowed or was uncertain, with a stack as deep as any tree and exact products: a variant, not a need of the scene.
+/// The kernel traces again what overflowed or was uncertain, with a stack as deep as any tree and numbers of two floats: a variant, not a need of the scene.
 layout(constant_id = 9) const bool RETRACE = true;
 /// Sample positions are those of a scrambled Sobol sequence instead of stratified ones.
 layout(constant_id = 10) const bool SOBOL = true;
@@ -35,12 +35,14 @@ layout(constant_id = 14) const bool NORMAL_MAPS = true;
 layout(constant_id = 15) const bool ALPHA = true;
 /// Some surfaces let light through: rays go on behind them.
 layout(constant_id = 16) const bool LAYERS = true;
+/// Some triangles are so thin that rounding may move hits on them from before a ray's start to behind it.
+layout(constant_id = 17) const bool THIN_TRIANGLES = true;
 
 // Safeguards switched off, one by one, to see what they prevent. Never on in a picture.
 
 /// Rays start a fixed distance off the surface.
-layout(constant_id = 17) const bool FIXED_EPSILON = false;
+layout(constant_id = 18) const bool FIXED_EPSILON = false;
 /// Triangles are tested as Möller and Trumbore do, which lets rays slip through between them.
-layout(constant_id = 18) const bool MOLLER_TRUMBORE = false;
+layout(constant_id = 19) const bool MOLLER_TRUMBORE = false;
 /// Samples are added up without compensation.
-layout(constant_id = 19) const bool PLAIN_SUMS = false;
+layout(constant_id = 20) const bool PLAIN_SUMS = false;

@@ -33,6 +33,8 @@ const uint ITEM_TEXELS = 2u;
 
 /// Added to the precedence of a triangle whose back is hit; its own is below.
 const uint PRECEDENCE_BACK = 0x80000000u;
+/// The last bit of a triangle's precedence: its longest edge is at least 32 times as long as it is high.
+const uint PRECEDENCE_THIN = 1u;
 /// Bits of a triangle's material word below its flags.
 const uint MATERIAL_BITS = 28u;
 /// Triangle flag: it is not opaque everywhere.
@@ -62,8 +64,16 @@ const uint COUNTER_READY = 4u;
 const uint COUNTER_TOTAL = 8u;
 /// Counter of rays whose second traversal was cut short too.
 const uint COUNTER_LOST = 12u;
+/// Counter that holds, as bits, which passes left rays to be traced again.
+const uint COUNTER_AGAIN = 13u;
 /// Number of counters.
-const uint COUNTERS = 13u;
+const uint COUNTERS = 14u;
+/// Bit of the primary pass where passes are bits.
+const uint AGAIN_PRIMARY = 1u;
+/// Bit of the shadow pass.
+const uint AGAIN_SHADOW = 2u;
+/// Bit of the reflection pass.
+const uint AGAIN_REFLECTION = 4u;
 
 /// Steps of the table that a filter's sample positions are read from.
 const uint FILTER_STEPS = 1024u;
@@ -198,6 +208,8 @@ struct Step {
     uint seed;
     /// resolve: the first sample of the picture.
     uint start;
+    /// resolve: passes whose rays are traced again, as bits.
+    uint again;
     /// Tracing again: reference of the subtree that is walked.
     uint root;
     /// Tracing again: 1 = no subtree was walked before.

@@ -12,6 +12,12 @@ uint queue_append(uint queue) {
     return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(lanes);
 }
 
+/// Leaves a ray of this pass, with its place in the queue that it came from, to be traced again.
+void trace_again(uint place, uint pass) {
+    atomicOr(counters[COUNTER_AGAIN], pass);
+    retrace_queue[queue_append(QUEUE_RETRACE)] = place;
+}
+
 /// Workgroups that stay neighbours when the grid is interleaved: no divisor or multiple of the tiles in a row of common widths.
 const uint STRETCH = 24u;
 

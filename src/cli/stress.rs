@@ -47,6 +47,7 @@ pub struct StressArgs {
 enum SabotageChoice {
     FixedEpsilon,
     MollerTrumbore,
+    SureOfThin,
     TightBoxes,
     NoRebase,
     PlainSums,
@@ -57,6 +58,7 @@ impl From<SabotageChoice> for Sabotage {
         match choice {
             SabotageChoice::FixedEpsilon => Self::FixedEpsilon,
             SabotageChoice::MollerTrumbore => Self::MollerTrumbore,
+            SabotageChoice::SureOfThin => Self::SureOfThin,
             SabotageChoice::TightBoxes => Self::TightBoxes,
             SabotageChoice::NoRebase => Self::NoRebase,
             SabotageChoice::PlainSums => Self::PlainSums,

@@ -1,11 +1,12 @@
 //! The frame: the order of the passes, wave by wave, and what comes back.
 
+use super::tracers::{Again, Tracers};
 use super::{upload, Options, Plan, Renderer};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{
-    binding, kernels, Features, Step, COUNTERS, COUNTER_FILLING, COUNTER_LOST, COUNTER_TOTAL, QUEUES, QUEUE_HIT,
-    QUEUE_REFLECTION, QUEUE_RETRACE, QUEUE_SHADOW, TILE, WORKGROUP,
+    binding, kernels, Step, AGAIN_PRIMARY, AGAIN_REFLECTION, AGAIN_SHADOW, COUNTERS, COUNTER_AGAIN, COUNTER_LOST,
+    COUNTER_TOTAL, QUEUES, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_RETRACE, QUEUE_SHADOW, TILE, WORKGROUP,
 };
 use crate::report;
 use crate::scene::{Background, View};
@@ -21,8 +22,7 @@ pub(super) struct Frame<'a> {
     view: &'a View,
     plan: Plan,
     pub trace: Tracers,
-    /// Variants that trace again what overflowed its stack; made when that first happens.
-    again: Option<Tracers>,
+    again: Again,
     /// Subtrees that tracing again walks through one by one: the whole tree, unless that is too much for one dispatch.
     parts: Vec<u32>,
     /// What to do then; `None` where it cannot be divided.
@@ -41,24 +41,6 @@ pub(super) struct Frame<'a> {
 
 /// Finds the subtrees for rays that are too long for one dispatch, when there are such; `None` where it cannot be divided.
 pub(super) type Parts<'a> = Box<dyn FnOnce() -> Option<Vec<u32>> + 'a>;
-
-/// The kernels that trace rays, as far as the frame has such rays.
-pub(super) struct Tracers {
-    pub primary: Arc<Kernel>,
-    pub shadow: Option<Arc<Kernel>>,
-    pub reflection: Option<Arc<Kernel>>,
-}
-
-impl Tracers {
-    fn new(renderer: &Renderer, features: Features) -> Result<Self> {
-        let kernel = |code| renderer.kernel(code, features);
-        Ok(Self {
-            primary: kernel(&kernels::PRIMARY)?,
-            shadow: features.shadows.then(|| kernel(&kernels::SHADOW)).transpose()?,
-            reflection: features.rays_go_on().then(|| kernel(&kernels::REFLECTION)).transpose()?,
-        })
-    }
-}
 
 /// What a frame tells besides its pixels.
 pub(super) struct Outcome {
@@ -104,7 +86,7 @@ impl<'a> Frame<'a> {
             renderer,
             view,
             trace: Tracers::new(renderer, features)?,
-            again: None,
+            again: Again::default(),
             parts: vec![0],
             smaller_parts: Some(smaller_parts),
             totals: Totals::new(&plan),
@@ -135,7 +117,7 @@ impl<'a> Frame<'a> {
         commands.barrier(Access::Transfer, Access::ShaderReadWrite);
         commands.bind(primary, &self.bindings);
         commands.dispatch(primary, bytemuck::bytes_of(&wave), samples.div_ceil(WORKGROUP));
-        self.trace_again(commands, wave, |again| Some(&again.primary));
+        self.trace_again(commands, wave, AGAIN_PRIMARY);
 
         for round in 0..rounds {
             let goes_on = reflection.is_some() && round + 1 < rounds;
@@ -160,19 +142,20 @@ impl<'a> Frame<'a> {
                 }
                 if let Some(shadow) = shadow {
                     commands.dispatch_indirect(shadow, bytemuck::bytes_of(&wave), arguments, QUEUE_SHADOW.into());
-                    self.trace_again(commands, wave, |again| again.shadow.as_ref());
+                    self.trace_again(commands, wave, AGAIN_SHADOW);
                     // Radiance and shadow queue: this light's shadow rays before the next pass on the same samples.
                     commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
                 }
             }
             if let (Some(reflection), true) = (reflection, goes_on) {
                 commands.dispatch_indirect(reflection, bytemuck::bytes_of(&wave), arguments, QUEUE_REFLECTION.into());
-                self.trace_again(commands, wave, |again| again.reflection.as_ref());
+                self.trace_again(commands, wave, AGAIN_REFLECTION);
             }
         }
         // Radiance: every pass wrote, resolve reads. Film: the wave before wrote, resolve adds.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
-        commands.dispatch(&self.resolve, bytemuck::bytes_of(&wave), wave.pixels.div_ceil(WORKGROUP));
+        let resolved = Step { again: self.again.passes(), ..wave };
+        commands.dispatch(&self.resolve, bytemuck::bytes_of(&resolved), wave.pixels.div_ceil(WORKGROUP));
         // Film and counters: kernels wrote, copies read.
         commands.barrier(Access::ShaderWrite, Access::Transfer);
         commands.copy(self.buffer(binding::COUNTERS), &self.read_back, 0, COUNTER_BYTES as u64);
@@ -194,14 +177,9 @@ impl<'a> Frame<'a> {
         commands.barrier(Access::ShaderWrite, Access::ShaderAndIndirect);
     }
 
-    /// Traces again what overflowed in the pass before, once it is known that anything does.
-    pub fn trace_again<'k>(
-        &'k self,
-        commands: &mut Commands,
-        wave: Step,
-        kernel: impl Fn(&'k Tracers) -> Option<&'k Arc<Kernel>>,
-    ) {
-        if let Some(kernel) = self.again.as_ref().and_then(kernel) {
+    /// Traces again what `pass`, the one before, left to it, once it is known that it leaves anything.
+    pub fn trace_again(&self, commands: &mut Commands, wave: Step, pass: u32) {
+        if let Some(kernel) = self.again.kernel(pass) {
             self.prepare(commands, &[QUEUE_RETRACE]);
             let arguments = self.buffer(binding::DISPATCHES);
             for (index, root) in self.parts.iter().enumerate() {
@@ -214,16 +192,18 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Whether rays overflowed that nobody traced again, or were cut short again: the wave is worth nothing and must be run once
-    /// more.
+    /// Whether a pass left rays that nobody traced again, or they were cut short again: the wave is worth nothing and must be run
+    /// once more.
     ///
     /// # Errors
     /// `Device` when it would not help.
     pub fn must_run_again(&mut self, counters: &[u32]) -> Result<bool> {
-        let overflowed = counters[(COUNTER_FILLING + QUEUE_RETRACE) as usize] > 0;
-        if overflowed {
-            self.again = Some(Tracers::new(self.renderer, Features { retrace: true, ..self.plan.features })?);
-            self.make_partial_hits()?;
+        let passes = counters[COUNTER_AGAIN as usize] & !self.again.passes();
+        if passes != 0 {
+            if self.again.passes() == 0 {
+                self.make_partial_hits()?;
+            }
+            self.again.make(self.renderer, passes, self.plan.features)?;
             return Ok(true);
         }
         let lost = counters[COUNTER_LOST as usize];
@@ -295,7 +275,7 @@ impl<'a> Frame<'a> {
             return Err(Error::Interrupted);
         }
         let dispatches = self.plan.dispatches_of_a_wave(self.view.samples);
-        let again = if self.again.is_some() { 1 + self.parts.len() as u64 } else { 0 };
+        let again = if self.again.passes() != 0 { 1 + self.parts.len() as u64 } else { 0 };
         let timed = dispatches * (1 + again);
         let mut commands = Commands::new(&self.renderer.device, timed.min(MOST_TIMED) as usize)?;
         self.record(&mut commands, wave);

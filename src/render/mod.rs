@@ -8,6 +8,7 @@ mod progressive;
 pub mod ray_sets;
 mod textures;
 mod trace;
+mod tracers;
 mod tree;
 mod upload;
 
@@ -79,6 +80,7 @@ impl Prepared {
             soup.dice(view.camera.eye);
         }
         let own = crate::scene::features::of(scene, &soup, &view);
+        let own = Features { thin_triangles: own.thin_triangles && !sabotage(Sabotage::SureOfThin), ..own };
         let features = Features {
             // Not needs: what was chosen.
             sobol: own.sobol,

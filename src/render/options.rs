@@ -19,6 +19,8 @@ pub enum Sabotage {
     FixedEpsilon,
     /// Triangles are tested by Möller and Trumbore's method, which is not watertight.
     MollerTrumbore,
+    /// Hits on thin triangles are believed however near the ray's start they are.
+    SureOfThin,
     /// Boxes in the tree are rounded to the nearest, not outward.
     TightBoxes,
     /// The device's world is the file's, neither moved nor scaled nor diced.

@@ -220,6 +220,7 @@ impl Plan {
         leave(features.layers, &["rays behind surfaces"], "no surface lets light through");
         leave(features.single_sided, &["back-face culling"], "all materials are double-sided");
         leave(features.instances, &["instances"], "no mesh is shared, or that would save little");
+        leave(features.thin_triangles, &["watch over thin triangles"], "no triangle is 32 times as long as high");
         leave(features.deep_tree, &["watch over the stack"], "the tree is no deeper than the stack");
         leave(features.multisampling, &["sample positions", "film_rest"], "one sample a pixel goes through its centre");
         let even = if features.multisampling {

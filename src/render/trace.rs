@@ -7,8 +7,8 @@ use super::textures::Textures;
 use super::{upload, Options, Plan, Rebase, Renderer};
 use crate::error::{Error, Result};
 use crate::layout::{
-    binding, Features, HitItem, RayItem, Step, COUNTERS, COUNTER_FILLING, FAR, QUEUE_HIT, QUEUE_REFLECTION,
-    QUEUE_SHADOW, WORKGROUP,
+    binding, Features, HitItem, RayItem, Step, AGAIN_PRIMARY, AGAIN_REFLECTION, AGAIN_SHADOW, COUNTERS,
+    COUNTER_FILLING, FAR, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW, WORKGROUP,
 };
 use crate::scene::{Scene, View};
 use crate::vulkan::{Access, Buffer, Commands, Kernel};
@@ -88,8 +88,9 @@ impl Renderer {
     ) -> Result<Tracer<'a>> {
         let alone = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
         let View { width, height, .. } = prepared.view;
-        let moller_trumbore = prepared.features.moller_trumbore;
-        let features = Features { shadows: true, reflections: true, moller_trumbore, ..Features::default() };
+        let Features { moller_trumbore, thin_triangles, .. } = prepared.features;
+        let features =
+            Features { shadows: true, reflections: true, moller_trumbore, thin_triangles, ..Features::default() };
         let features = tree.features(features);
         let textures = Textures::of(scene, features.textures, self.device.fetch_limit())?;
         let plan = Plan::with_textures(prepared, scene, features, tree.size(), width * height, &textures);
@@ -172,15 +173,15 @@ impl Tracer<'_> {
         match kind {
             SetKind::Primary => {
                 commands.dispatch(&trace.primary, bytemuck::bytes_of(&wave), rays.div_ceil(WORKGROUP));
-                self.frame.trace_again(&mut commands, wave, |again| Some(&again.primary));
+                self.frame.trace_again(&mut commands, wave, AGAIN_PRIMARY);
             }
             SetKind::Shadow => {
                 from_queue(&trace.shadow, QUEUE_SHADOW);
-                self.frame.trace_again(&mut commands, wave, |again| again.shadow.as_ref());
+                self.frame.trace_again(&mut commands, wave, AGAIN_SHADOW);
             }
             SetKind::Mirror | SetKind::Diffuse => {
                 from_queue(&trace.reflection, QUEUE_REFLECTION);
-                self.frame.trace_again(&mut commands, wave, |again| again.reflection.as_ref());
+                self.frame.trace_again(&mut commands, wave, AGAIN_REFLECTION);
             }
         }
         // Queues, radiance, counters: kernels wrote, copies of the next submission read.

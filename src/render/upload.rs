@@ -6,7 +6,8 @@ use super::Renderer;
 use crate::error::Result;
 use crate::layout::{
     self, binding, Features, ALPHA_BLEND, ALPHA_MASK, ALPHA_OPAQUE, FAR, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT,
-    TILE, TRIANGLE_COLORED, TRIANGLE_SEE_THROUGH, TRIANGLE_SINGLE_SIDED, TRIANGLE_SMOOTH, TRIANGLE_TEXELS,
+    PRECEDENCE_THIN, TILE, TRIANGLE_COLORED, TRIANGLE_SEE_THROUGH, TRIANGLE_SINGLE_SIDED, TRIANGLE_SMOOTH,
+    TRIANGLE_TEXELS,
 };
 use crate::scene::{self, AlphaMode, LightKind, Projection, Soup, UsedMap, View};
 use crate::vulkan::{Access, Buffer, Commands, Memory, Usage};
@@ -73,8 +74,9 @@ impl Scene<'_> {
                 (flags.colored, TRIANGLE_COLORED),
                 (flags.see_through, TRIANGLE_SEE_THROUGH),
             ];
-            let flags: u32 = bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
-            let extra = [*primitive, soup.materials[index] | flags, precedence[index]];
+            let bits_of_flags: u32 = bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum();
+            let precedence = precedence[index] & !PRECEDENCE_THIN | if flags.thin { PRECEDENCE_THIN } else { 0 };
+            let extra = [*primitive, soup.materials[index] | bits_of_flags, precedence];
             let rebase = self.tree.rebase_of(index);
             let texel = |corner: usize| with_bits(rebase.point(soup.positions[index][corner]), extra[corner]);
             [texel(0), texel(1), texel(2)]

@@ -6,7 +6,8 @@
 //!
 //! Whether an edge is cut, and where, depends on that edge and the eye alone, so triangles that share it stay without a gap.
 
-use super::Soup;
+use super::soup::is_thin;
+use super::{Soup, TriangleFlags};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -208,10 +209,12 @@ impl Soup {
             let mut one = Soup::default();
             one.push_piece(first, &attributes);
             self.replace_with_last(primitive, &mut one);
+            self.flags[primitive].thin = is_thin(&self.positions[primitive]);
             for piece in rest {
                 added.push_piece(piece, &attributes);
                 added.materials.push(self.materials[primitive]);
-                added.flags.push(self.flags[primitive]);
+                let thin = is_thin(&piece.map(|corner| corner.position));
+                added.flags.push(TriangleFlags { thin, ..self.flags[primitive] });
             }
         }
         // Behind the triangles that stand alone, so that these keep their numbers.

@@ -32,6 +32,7 @@ pub fn of(scene: &Scene, soup: &Soup, view: &View) -> Features {
         textures: maps(super::Maps::any),
         normal_maps: maps(|maps| maps.normal.is_some()),
         alpha: materials.iter().any(|material| material.is_see_through()),
+        thin_triangles: soup.flags.iter().any(|flags| flags.thin),
         layers: materials.iter().any(|material| material.lets_light_through()),
         // These are the renderer's to know.
         deep_tree: false,

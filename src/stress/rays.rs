@@ -187,19 +187,42 @@ fn needle(stress: &Stress, name: &str, aspect: f64, transform: DMat4) -> Result<
 }
 
 /// Rays that start on the faces of a tilted cube, outward and inward, at an angle to the face, from where the shading passes would
-/// let them start.
+/// let them start; and outward from the plane of ever narrower planks.
 pub(super) fn leaving_faces(stress: &mut Stress) -> Result<()> {
     for angle in stress.few(&[1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6], &[1e-2, 1e-4, 1e-6]) {
         for (name, side) in [("outward", 1.0), ("inward", -1.0)] {
-            stress.row(&format!("rays {name}, grazing angle"), angle, |stress| leaving(stress, name, side, angle))?;
+            stress.row(&format!("rays {name}, grazing angle"), angle, |stress| {
+                leaving(stress, &format!("{name}-{angle:e}"), shapes::cube(), side, angle, 0.0)
+            })?;
         }
+    }
+    for aspect in stress.few(&[1e1, 1e2, 1e3, 1e4, 1e5, 1e6], &[1e3, 1e5]) {
+        stress.row("rays outward, planks of aspect", aspect, |stress| {
+            leaving(stress, &format!("planks-{aspect:e}"), planks(aspect), 1.0, 0.1, 2.0)
+        })?;
     }
     Ok(())
 }
 
-fn leaving(stress: &Stress, name: &str, side: f64, angle: f64) -> Result<Finding> {
+/// Planks side by side.
+const PLANKS: u32 = 16;
+
+/// A part of a plane, of planks of length 1 that share no vertices.
+fn planks(aspect: f64) -> Mesh {
+    let mut mesh = Mesh { name: "planks".into(), ..Mesh::default() };
+    for plank in 0..PLANKS {
+        let start = [f64::from(plank), f64::from(plank + 1)].map(|edge| edge / aspect);
+        let corners = [(-0.5, start[0]), (-0.5, start[1]), (0.5, start[1]), (0.5, start[0])];
+        mesh.positions.extend(corners.map(|(x, z)| DVec3::new(x, 0.0, z).as_vec3()));
+        mesh.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|corners| corners.map(|corner| 4 * plank + corner)));
+    }
+    mesh
+}
+
+/// Rays that leave a convex mesh: outward they meet nothing, inward always its other side.
+fn leaving(stress: &Stress, name: &str, mesh: Mesh, side: f64, angle: f64, eye: f64) -> Result<Finding> {
     let transform = tilt();
-    let scene = scene_of([(shapes::cube(), transform, grey(1.0, 0.0, 0.0))], Vec::new());
+    let scene = scene_of([(mesh, transform, grey(1.0, 0.0, 0.0))], Vec::new());
     let mut random = Random::new(31);
     let make = |prepared: &Prepared, count: usize| {
         let triangles = &prepared.soup.positions;
@@ -214,15 +237,15 @@ fn leaving(stress: &Stress, name: &str, side: f64, angle: f64) -> Result<Finding
             let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize() * side;
             let along = random.in_cube().reject_from(normal).normalize();
             let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - point;
-            let error = POINT_ERROR * point.abs().max_element();
+            let largest = corners.iter().fold(0.0_f64, |largest, corner| largest.max(corner.abs().max_element()));
+            let error = POINT_ERROR * largest;
             let origin = point + normal * error + middle.normalize() * (4.0 * error).min(0.01 * middle.length());
             let direction = along * angle.cos() + normal * angle.sin();
             Ray { origin: origin.as_vec3().as_dvec3(), direction, t_max: f64::MAX }
         };
         (0..count).map(ray).collect()
     };
-    let name = format!("{name}-{angle:e}");
-    let (_, rays, met) = stress.nearest(&name, &scene, DVec3::ZERO, DVec3::Z, make)?;
+    let (_, rays, met) = stress.nearest(name, &scene, transform.transform_point3(DVec3::Y * eye), DVec3::Z, make)?;
     let meets = |met: &Met| *met != Met::Nothing;
     let wrong = met.iter().filter(|met| meets(met) != (side < 0.0)).count();
     Ok(Finding::none_of(rays.len() as u64, wrong as u64))
