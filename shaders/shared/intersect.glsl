@@ -72,7 +72,9 @@ ShearedRay shear_ray(Ray ray) {
     ShearedRay sheared = ShearedRay(ray.origin, vec3(d.x / d.z, d.y / d.z, 1.0 / d.z), vec2(0.0), axis);
     if (RETRACE) {
         precise vec2 back = sheared.shear.xy * d.z;
-        precise vec2 rest = (d.xy - back) - vec2(product_rest(sheared.shear.x, d.z, back.x), product_rest(sheared.shear.y, d.z, back.y));
+        vec2 back_rest =
+            vec2(product_rest(sheared.shear.x, d.z, back.x), product_rest(sheared.shear.y, d.z, back.y));
+        precise vec2 rest = (d.xy - back) - back_rest;
         sheared.shear_rest = rest * sheared.shear.z;
     }
     return sheared;
@@ -123,8 +125,10 @@ ExactCorner shear_exactly(ShearedRay ray, uvec4 texel, vec3 corner) {
     precise vec2 at = corner.xy - shift;
     precise vec2 shifted = at - corner.xy;
     precise vec2 at_rest = (corner.xy - (at - shifted)) - (shift + shifted);
-    vec2 shift_rest = vec2(product_rest(ray.shear.x, corner.z, shift.x), product_rest(ray.shear.y, corner.z, shift.y));
-    precise vec2 rest = at_rest + (corner_rest.xy - (shift_rest + (ray.shear.xy * corner_rest.z + ray.shear_rest * corner.z)));
+    vec2 shift_rest =
+        vec2(product_rest(ray.shear.x, corner.z, shift.x), product_rest(ray.shear.y, corner.z, shift.y));
+    precise vec2 low_products = ray.shear.xy * corner_rest.z + ray.shear_rest * corner.z;
+    precise vec2 rest = at_rest + (corner_rest.xy - (shift_rest + low_products));
     return ExactCorner(at, rest);
 }
 
@@ -133,7 +137,8 @@ ExactCorner shear_exactly(ShearedRay ray, uvec4 texel, vec3 corner) {
 vec2 exact_edge_function(ExactCorner p, ExactCorner q) {
     precise float first = p.at.x * q.at.y;
     precise float second = p.at.y * q.at.x;
-    precise float rounded = (first - second) + (product_rest(p.at.x, q.at.y, first) - product_rest(p.at.y, q.at.x, second));
+    float lost = product_rest(p.at.x, q.at.y, first) - product_rest(p.at.y, q.at.x, second);
+    precise float rounded = (first - second) + lost;
     precise float first_rest = p.at.x * q.rest.y + p.rest.x * q.at.y;
     precise float second_rest = p.at.y * q.rest.x + p.rest.y * q.at.x;
     precise float exact = rounded + (first_rest - second_rest);
@@ -175,7 +180,8 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance
     precise float volume = u * a.z + v * b.z + w * c.z;
     bool is_thin = THIN_TRIANGLES && (texel_c.w & PRECEDENCE_THIN) != 0u;
     float reach = max(abs(a.z), max(abs(b.z), abs(c.z)));
-    bool is_uncertain = inside && (abs(det) <= size * LITTLE_LEFT || (is_thin && abs(volume) <= size * reach * VOLUME_ERROR));
+    bool is_uncertain =
+        inside && (abs(det) <= size * LITTLE_LEFT || (is_thin && abs(volume) <= size * reach * VOLUME_ERROR));
     if (RETRACE && is_uncertain) {
         ExactCorner exact_a = shear_exactly(ray, texel_a, a);
         ExactCorner exact_b = shear_exactly(ray, texel_b, b);
@@ -185,12 +191,16 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance
         vec2 both_w = exact_edge_function(exact_b, exact_a);
         vec2 both = both_u + both_v + both_w;
         // Nothing that is left of a triangle when corners are rounded covers nothing.
-        inside = both.x != 0.0 && (min(both_u.x, min(both_v.x, both_w.x)) >= 0.0 || max(both_u.x, max(both_v.x, both_w.x)) <= 0.0);
-        u = both_u.y;
-        v = both_v.y;
-        w = both_w.y;
+        inside = both.x != 0.0 && (min(both_u.x, min(both_v.x, both_w.x)) >= 0.0 ||
+                                   max(both_u.x, max(both_v.x, both_w.x)) <= 0.0);
         det = both.y;
-        volume = u * a.z + v * b.z + w * c.z;
+        volume = both_u.y * a.z + both_v.y * b.z + both_w.y * c.z;
+        // Beside the triangle, by less than corners are rounded, means its edge.
+        vec3 weights = max(vec3(both_u.y, both_v.y, both_w.y) * sign(det), 0.0);
+        weights *= det / max(weights.x + weights.y + weights.z, 1e-37);
+        u = weights.x;
+        v = weights.y;
+        w = weights.z;
     }
     if (!RETRACE) {
         uncertain = uncertain || is_uncertain;
@@ -218,8 +228,6 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance
     bool nearer = t < hit.t || (t == hit.t && is_first);
     if (inside && det != 0.0 && t > 0.0 && nearer && !culled) {
         vec2 barycentrics = vec2(v, w) / det;
-        if (RETRACE)
-            barycentrics = max(barycentrics, 0.0) / max(1.0, max(barycentrics.x, 0.0) + max(barycentrics.y, 0.0));
         if (ALPHA && (texel_b.w & TRIANGLE_SEE_THROUGH) != 0u && !is_met(texel_a.w, texel_b.w, barycentrics, any, hit))
             return false;
         hit = Hit(t, triangle, texel_a.w, barycentrics, instance, precedence, hit.passed);
