@@ -8,6 +8,9 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 
+#[global_allocator]
+static ALLOCATOR: glimt::memory::HugePages = glimt::memory::HugePages;
+
 fn main() -> ExitCode {
     let context =
         cli::Context { started: std::time::Instant::now(), interrupted: Arc::new(AtomicBool::new(false)), print };

@@ -9,6 +9,7 @@ use super::reinsert::reinsert;
 use super::{object_split, spatial_split, Bvh, Child, Node, Wide};
 use crate::layout::MAX_TREE_DEPTH;
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Cost of visiting a node, in triangle tests.
 pub(super) const VISIT_COST: f32 = 1.2;
@@ -39,8 +40,9 @@ struct Builder<'a> {
 /// Builds over the first `count` references of `space`.
 pub(super) fn build(space: &mut [Reference], count: usize, recipe: Recipe) -> Bvh {
     let builder = Builder { recipe, whole: Summary::of(&space[..count]).bounds.half_area() };
-    let mut nodes = Vec::new();
-    let (bounds, root) = builder.subtree(space, count, 0, 1, &mut nodes);
+    let Built { bounds, root, pieces } = builder.large(space, count, 0, 1);
+    let mut nodes = joined(&pieces);
+    drop(pieces);
     if nodes.is_empty() {
         // The root is always a node, so that traversal needs no special case for small scenes.
         nodes.push(Node { bounds: [bounds.aabb(); 2], children: [root, Child::Leaf { first: 0, count: 0 }] });
@@ -69,7 +71,83 @@ pub(super) fn build(space: &mut [Reference], count: usize, recipe: Recipe) -> Bv
     bvh
 }
 
+/// A subtree, in pieces that were built side by side.
+struct Built {
+    bounds: Box4,
+    root: Child,
+    pieces: Vec<Piece>,
+}
+
+/// Nodes that lie together; they number each other from the first on.
+struct Piece {
+    /// Where they begin among the nodes of the subtree.
+    first: u32,
+    nodes: Vec<Node>,
+}
+
+impl Built {
+    fn node_count(&self) -> u32 {
+        self.pieces.last().map_or(0, |last| last.first + last.nodes.len() as u32)
+    }
+
+    /// Its pieces as those of a subtree in which it begins at node `at`.
+    fn behind(self, at: u32) -> impl Iterator<Item = Piece> {
+        self.pieces.into_iter().map(move |piece| Piece { first: piece.first + at, ..piece })
+    }
+}
+
+/// All nodes in one array.
+fn joined(pieces: &[Piece]) -> Vec<Node> {
+    let count = pieces.last().map_or(0, |last| last.first as usize + last.nodes.len());
+    let node = |index: usize| {
+        let piece = &pieces[pieces.partition_point(|piece| piece.first as usize <= index) - 1];
+        let node = &piece.nodes[index - piece.first as usize];
+        Node { children: node.children.map(|child| renumbered(child, piece.first)), ..*node }
+    };
+    (0..count).into_par_iter().map(node).collect()
+}
+
+fn leaf(first: usize, count: usize) -> Child {
+    Child::Leaf { first: first as u32, count: count as u32 }
+}
+
+/// How the references of a node are divided: the right ones lie behind the left ones and the left side's free space.
+struct Halves {
+    left_count: usize,
+    right_count: usize,
+    /// Where the right side begins.
+    middle: usize,
+}
+
 impl Builder<'_> {
+    /// Builds the subtree over the first `count` references of `space`, whose place in the whole is `first`, in parallel.
+    fn large(&self, space: &mut [Reference], count: usize, first: usize, depth: u32) -> Built {
+        if count <= PARALLEL {
+            let mut nodes = Vec::new();
+            let (bounds, root) = self.subtree(space, count, first, depth, &mut nodes);
+            let pieces = if nodes.is_empty() { Vec::new() } else { vec![Piece { first: 0, nodes }] };
+            return Built { bounds, root, pieces };
+        }
+        let (bounds, halves) = self.halves(space, count, depth);
+        let Halves { left_count, right_count, middle } = match halves {
+            Ok(halves) => halves,
+            Err(count) => return Built { bounds, root: leaf(first, count), pieces: Vec::new() },
+        };
+        let (left, right) = space.split_at_mut(middle);
+        let (left, right) = rayon::join(
+            || self.large(left, left_count, first, depth + 1),
+            || self.large(right, right_count, first + middle, depth + 1),
+        );
+        let behind_left = 1 + left.node_count();
+        let node = Node {
+            bounds: [left.bounds.aabb(), right.bounds.aabb()],
+            children: [renumbered(left.root, 1), renumbered(right.root, behind_left)],
+        };
+        let own = Piece { first: 0, nodes: vec![node] };
+        let pieces = std::iter::once(own).chain(left.behind(1)).chain(right.behind(behind_left)).collect();
+        Built { bounds, root: Child::Node(0), pieces }
+    }
+
     /// Builds the subtree over the first `count` references of `space`, whose place in the whole is `first`, and appends
     /// its nodes.
     fn subtree(
@@ -80,42 +158,32 @@ impl Builder<'_> {
         depth: u32,
         nodes: &mut Vec<Node>,
     ) -> (Box4, Child) {
+        let (bounds, halves) = self.halves(space, count, depth);
+        let Halves { left_count, right_count, middle } = match halves {
+            Ok(halves) => halves,
+            Err(count) => return (bounds, leaf(first, count)),
+        };
+        let (left, right) = space.split_at_mut(middle);
+        let own = nodes.len();
+        nodes.push(Node { bounds: [bounds.aabb(); 2], children: [Child::Leaf { first: 0, count: 0 }; 2] });
+        let left = self.subtree(left, left_count, first, depth + 1, nodes);
+        let right = self.subtree(right, right_count, first + middle, depth + 1, nodes);
+        nodes[own] = Node { bounds: [left.0.aabb(), right.0.aabb()], children: [left.1, right.1] };
+        (bounds, Child::Node(own as u32))
+    }
+
+    /// Divides a node's references, the first `count` of `space`; or leaves them as a leaf's.
+    fn halves(&self, space: &mut [Reference], count: usize, depth: u32) -> (Box4, Result<Halves, usize>) {
         let summary = Summary::of(&space[..count]);
-        let bounds = summary.bounds;
         let Some((left_count, count)) = self.split(space, count, &summary, depth) else {
-            return (bounds, Child::Leaf { first: first as u32, count: count as u32 });
+            return (summary.bounds, Err(count));
         };
         let right_count = count - left_count;
         // The right side's references move behind the left side's free space.
         let left_free = left_share(&space[..count], left_count, space.len() - count);
         let moved = left_free.min(right_count);
         space.copy_within(left_count..left_count + moved, left_count + left_free + right_count - moved);
-        let middle = left_count + left_free;
-        let (left, right) = space.split_at_mut(middle);
-        let own = nodes.len();
-        nodes.push(Node { bounds: [bounds.aabb(); 2], children: [Child::Leaf { first: 0, count: 0 }; 2] });
-        let (left, right) = if count > PARALLEL {
-            // The right half is numbered from 0 until it is known how many nodes the left half has.
-            let mut right_nodes = Vec::new();
-            let (left, right) = rayon::join(
-                || self.subtree(left, left_count, first, depth + 1, nodes),
-                || self.subtree(right, right_count, first + middle, depth + 1, &mut right_nodes),
-            );
-            let at = nodes.len() as u32;
-            nodes.extend(
-                right_nodes
-                    .into_iter()
-                    .map(|node| Node { children: node.children.map(|child| renumbered(child, at)), ..node }),
-            );
-            (left, (right.0, renumbered(right.1, at)))
-        } else {
-            (
-                self.subtree(left, left_count, first, depth + 1, nodes),
-                self.subtree(right, right_count, first + middle, depth + 1, nodes),
-            )
-        };
-        nodes[own] = Node { bounds: [left.0.aabb(), right.0.aabb()], children: [left.1, right.1] };
-        (bounds, Child::Node(own as u32))
+        (summary.bounds, Ok(Halves { left_count, right_count, middle: left_count + left_free }))
     }
 
     /// Partitions the first `count` references and returns how many go left and how many there are now, or `None` for a

@@ -108,14 +108,20 @@ impl Bvh {
 
     /// Builds a tree over triangles, as [`Bvh::over_boxes`]; one that is long may lie in several leaves.
     pub fn over_triangles(triangles: &[[Vec3; 3]], quality: Quality) -> Self {
-        let count = triangles.len();
+        Self::over(triangles.len(), |primitive| triangles[primitive], quality)
+    }
+
+    /// As [`Bvh::over_triangles`], over the triangles that `triangle` makes of numbers below `count`; it may be asked for each several times.
+    pub fn over(count: usize, triangle: impl Fn(usize) -> [Vec3; 3] + Sync, quality: Quality) -> Self {
         let (free, overlap) = quality.spatial(count);
-        let reference = |primitive: usize| match triangles.get(primitive) {
-            Some(triangle) => Reference::of_triangle(triangle, primitive as u32),
-            None => Reference::NONE,
+        let reference = |primitive: usize| match primitive < count {
+            true => Reference::of_triangle(&triangle(primitive), primitive as u32),
+            false => Reference::NONE,
         };
         let mut space: Vec<Reference> = (0..count + free).into_par_iter().map(reference).collect();
-        let spatial = (free > 0).then_some((triangles, overlap));
+        // Only what may be cut is looked at again.
+        let triangles: Vec<[Vec3; 3]> = (0..if free > 0 { count } else { 0 }).into_par_iter().map(&triangle).collect();
+        let spatial = (free > 0).then_some((triangles.as_slice(), overlap));
         build::build(&mut space, count, Recipe { leaf: LEAF, spatial, reinsert: quality == Quality::Best })
     }
 

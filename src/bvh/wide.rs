@@ -1,7 +1,7 @@
 //! The binary tree with up to four children a node, as the kernels walk it: half as many steps, and four boxes are fetched
 //! and tested while software Vulkan waits for each other's results.
 
-use super::{Aabb, Bvh, Child};
+use super::{Aabb, Bvh, Child, Node};
 
 /// Children of a wide node.
 pub const WIDTH: usize = 4;
@@ -40,6 +40,12 @@ pub struct Wide {
 
 /// The least surface of all wide nodes at and below a binary node that becomes at most 1, 2, … children of a wide node.
 type ForestCost = [f32; WIDTH - 1];
+
+/// A leaf's.
+const NO_COST: ForestCost = [0.0; WIDTH - 1];
+
+/// Smaller subtrees are looked at by one thread.
+const PARALLEL: usize = 4096;
 
 impl Wide {
     /// Leaves those binary nodes out that make the surfaces of the rest, and so the visits of a random ray, fewest (by the
@@ -83,33 +89,53 @@ impl Bvh {
 
     /// For each binary node.
     fn forest_costs(&self) -> Vec<ForestCost> {
-        let mut costs = vec![[0.0; WIDTH - 1]; self.nodes.len()];
-        // A node comes before what is below it.
-        for (index, node) in self.nodes.iter().enumerate().rev() {
-            let own = node.bounds[0].union(&node.bounds[1]).half_area();
-            costs[index][0] = own + self.best_split(index as u32, WIDTH, &costs).0;
-            for trees in 2..WIDTH {
-                costs[index][trees - 1] = self.best_split(index as u32, trees, &costs).0.min(costs[index][trees - 2]);
-            }
-        }
+        let mut costs = vec![NO_COST; self.nodes.len()];
+        self.find_costs(0, &mut costs);
         costs
     }
 
-    /// The least cost of a node's two children that together become so many trees, and how many of them the first does.
-    fn best_split(&self, node: u32, trees: usize, costs: &[ForestCost]) -> (f32, usize) {
-        let cost = |side: u8, trees: usize| match self.child_of(Side { node, side }) {
-            Child::Node(below) => costs[below as usize][trees - 1],
-            Child::Leaf { .. } => 0.0,
+    /// Finds the costs of a subtree, of its root first: nodes are in depth-first order.
+    fn find_costs(&self, root: u32, costs: &mut [ForestCost]) {
+        let Node { bounds, children } = &self.nodes[root as usize];
+        let left_end = match children[1] {
+            Child::Node(right) => (right - root) as usize,
+            Child::Leaf { .. } => costs.len(),
         };
-        let split = |first: usize| (cost(0, first) + cost(1, trees - first), first);
-        (1..trees).map(split).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
+        let is_large = costs.len() > PARALLEL;
+        let (lefts, rights) = costs.split_at_mut(left_end);
+        let Some((own, lefts)) = lefts.split_first_mut() else { return };
+        let below = |child: Child, costs: &mut [ForestCost]| match child {
+            Child::Node(node) => {
+                self.find_costs(node, costs);
+                costs[0]
+            }
+            Child::Leaf { .. } => NO_COST,
+        };
+        let both = if is_large {
+            rayon::join(|| below(children[0], lefts), || below(children[1], rights))
+        } else {
+            (below(children[0], lefts), below(children[1], rights))
+        };
+        own[0] = bounds[0].union(&bounds[1]).half_area() + best_split(&both.into(), WIDTH).0;
+        for trees in 2..WIDTH {
+            own[trees - 1] = best_split(&both.into(), trees).0.min(own[trees - 2]);
+        }
+    }
+
+    /// How many of a node's so many trees its first child becomes.
+    fn trees_of_first(&self, node: u32, trees: usize, costs: &[ForestCost]) -> usize {
+        let both = self.nodes[node as usize].children.map(|child| match child {
+            Child::Node(below) => costs[below as usize],
+            Child::Leaf { .. } => NO_COST,
+        });
+        best_split(&both, trees).1
     }
 
     /// The children of a wide node over a binary one, their nodes still numbered as in the binary tree.
     fn children_of(&self, node: u32, costs: &[ForestCost]) -> WideNode {
         let mut children = [None; WIDTH];
         let mut filled = 0;
-        let (_, first) = self.best_split(node, WIDTH, costs);
+        let first = self.trees_of_first(node, WIDTH, costs);
         let mut open = vec![(Side { node, side: 1 }, WIDTH - first), (Side { node, side: 0 }, first)];
         while let Some((side, trees)) = open.pop() {
             let child = self.child_of(side);
@@ -121,7 +147,7 @@ impl Bvh {
                     match fewer {
                         Some(fewer) => open.push((side, fewer)),
                         None => {
-                            let (_, first) = self.best_split(below, trees, costs);
+                            let first = self.trees_of_first(below, trees, costs);
                             open.push((Side { node: below, side: 1 }, trees - first));
                             open.push((Side { node: below, side: 0 }, first));
                         }
@@ -135,6 +161,12 @@ impl Bvh {
         }
         children
     }
+}
+
+/// The least cost of two children that together become so many trees, and how many of them the first does.
+fn best_split([first, second]: &[ForestCost; 2], trees: usize) -> (f32, usize) {
+    let split = |own: usize| (first[own - 1] + second[trees - own - 1], own);
+    (1..trees).map(split).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -1,35 +1,31 @@
 //! The frame: the order of the passes, wave by wave, and what comes back.
 
-use super::tracers::{Again, Tracers};
+use super::tracers::{Again, Kernels, Tracers};
 use super::{upload, Options, Plan, Renderer};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{
-    binding, kernels, Step, AGAIN_PRIMARY, AGAIN_REFLECTION, AGAIN_SHADOW, COUNTERS, COUNTER_AGAIN, COUNTER_LOST,
-    COUNTER_TOTAL, QUEUES, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_RETRACE, QUEUE_SHADOW, TILE, WORKGROUP,
+    binding, Step, AGAIN_PRIMARY, AGAIN_REFLECTION, AGAIN_SHADOW, COUNTERS, COUNTER_AGAIN, COUNTER_LOST, COUNTER_TOTAL,
+    QUEUES, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_RETRACE, QUEUE_SHADOW, TILE, WORKGROUP,
 };
 use crate::report;
 use crate::scene::{Background, View};
-use crate::vulkan::{Access, Bindings, Buffer, Commands, Kernel, Memory, Usage};
+use crate::vulkan::{Access, Bindings, Buffer, Commands, Memory, Usage};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
-use std::sync::Arc;
 
 /// A scene on the device, ready to run.
 pub(super) struct Frame<'a> {
     pub renderer: &'a Renderer,
     view: &'a View,
     plan: Plan,
-    pub trace: Tracers,
+    pub kernels: Kernels,
     again: Again,
     /// Subtrees that tracing again walks through one by one: the whole tree, unless that is too much for one dispatch.
     parts: Vec<u32>,
     /// What to do then; `None` where it cannot be divided.
     smaller_parts: Option<Parts<'a>>,
-    prepare: Arc<Kernel>,
-    shade: Arc<Kernel>,
-    resolve: Arc<Kernel>,
     // Dropped before the buffers it names.
     pub bindings: Bindings,
     /// By slot; views have none of their own.
@@ -67,32 +63,27 @@ impl<'a> Frame<'a> {
     ) -> Result<Self> {
         let features = plan.features;
         let owners = binding::ALL.iter().filter(|slot| slot.view_of.is_none());
-        let buffers = plan
-            .buffers
-            .iter()
-            .zip(owners)
-            .map(|(planned, slot)| {
-                assert_eq!(planned.name, slot.name, "the plan lists buffers in the order of their slots");
-                let filled = scene.buffer(renderer, slot.slot, features);
-                let buffer =
-                    filled.unwrap_or_else(|| upload::frame_buffer(renderer, slot.slot, slot.name, planned.bytes));
-                buffer.map(|buffer| (slot.slot, buffer))
-            })
-            .collect::<Result<BTreeMap<_, _>>>()?;
+        let buffers = plan.buffers.iter().zip(owners).map(|(planned, slot)| {
+            assert_eq!(planned.name, slot.name, "the plan lists buffers in the order of their slots");
+            let filled = scene.buffer(renderer, slot.slot, features);
+            let buffer = filled.unwrap_or_else(|| upload::frame_buffer(renderer, slot.slot, slot.name, planned.bytes));
+            buffer.map(|buffer| (slot.slot, buffer))
+        });
+        // The driver makes kernels on this thread while others write what they will read.
+        let (kernels, buffers) =
+            rayon::join(|| Kernels::new(renderer, features), || buffers.collect::<Result<BTreeMap<_, _>>>());
+        let (kernels, buffers) = (kernels?, buffers?);
         let bindings = bind(renderer, &buffers)?;
         let read_back = COUNTER_BYTES as u64 + u64::from(plan.band_pixels) * PIXEL_BYTES as u64;
         let read_back = Buffer::new(&renderer.device, "read back", read_back, Usage::Storage, Memory::ReadBack)?;
         Ok(Self {
             renderer,
             view,
-            trace: Tracers::new(renderer, features)?,
+            kernels,
             again: Again::default(),
             parts: vec![0],
             smaller_parts: Some(smaller_parts),
             totals: Totals::new(&plan),
-            prepare: renderer.kernel(&kernels::PREPARE, features)?,
-            shade: renderer.kernel(&kernels::SHADE, features)?,
-            resolve: renderer.kernel(&kernels::RESOLVE, features)?,
             plan,
             bindings,
             buffers,
@@ -108,7 +99,7 @@ impl<'a> Frame<'a> {
     /// Records one wave: the whole algorithm.
     fn record(&self, commands: &mut Commands, wave: Step) {
         let Plan { rounds, lights, .. } = self.plan;
-        let Tracers { primary, shadow, reflection } = &self.trace;
+        let Tracers { primary, shadow, reflection } = &self.kernels.trace;
         let arguments = self.buffer(binding::DISPATCHES);
         let samples = wave.pixels * wave.samples;
 
@@ -133,7 +124,7 @@ impl<'a> Frame<'a> {
                     round,
                     ..wave
                 };
-                commands.dispatch_indirect(&self.shade, bytemuck::bytes_of(&step), arguments, QUEUE_HIT.into());
+                commands.dispatch_indirect(&self.kernels.shade, bytemuck::bytes_of(&step), arguments, QUEUE_HIT.into());
                 match (shadow.is_some(), reflect) {
                     (true, true) => self.prepare(commands, &[QUEUE_SHADOW, QUEUE_REFLECTION]),
                     (true, false) => self.prepare(commands, &[QUEUE_SHADOW]),
@@ -155,7 +146,7 @@ impl<'a> Frame<'a> {
         // Radiance: every pass wrote, resolve reads. Film: the wave before wrote, resolve adds.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
         let resolved = Step { again: self.again.passes(), ..wave };
-        commands.dispatch(&self.resolve, bytemuck::bytes_of(&resolved), wave.pixels.div_ceil(WORKGROUP));
+        commands.dispatch(&self.kernels.resolve, bytemuck::bytes_of(&resolved), wave.pixels.div_ceil(WORKGROUP));
         // Film and counters: kernels wrote, copies read.
         commands.barrier(Access::ShaderWrite, Access::Transfer);
         commands.copy(self.buffer(binding::COUNTERS), &self.read_back, 0, COUNTER_BYTES as u64);
@@ -172,7 +163,7 @@ impl<'a> Frame<'a> {
         let queues = queues.iter().map(|queue| 1 << queue).sum();
         // Queues and counters: the pass before filled them, prepare reads.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
-        commands.dispatch(&self.prepare, bytemuck::bytes_of(&Step { queues, ..Step::default() }), 1);
+        commands.dispatch(&self.kernels.prepare, bytemuck::bytes_of(&Step { queues, ..Step::default() }), 1);
         // Arguments: prepare wrote, indirect dispatches read them and their kernels the counters.
         commands.barrier(Access::ShaderWrite, Access::ShaderAndIndirect);
     }

@@ -170,13 +170,9 @@ impl Renderer {
 
     /// The kernel with these features, compiled once.
     fn kernel(&self, code: &KernelCode, features: Features) -> Result<Arc<Kernel>> {
-        let mut kernels = self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kernel) = kernels.get(&(code.name, features)) {
+        let kernels = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kernel) = kernels().get(&(code.name, features)) {
             return Ok(kernel.clone());
-        }
-        if kernels.len() >= MOST_KERNELS {
-            // Frames hold on to those they use.
-            kernels.clear();
         }
         let spirv = match self.device.fetch {
             Fetch::Texel => code.texel_fetch,
@@ -186,6 +182,11 @@ impl Renderer {
         let constants = features.list().map(|(_, on)| on);
         let name = if features.retrace { "retrace" } else { code.name };
         let kernel = Arc::new(Kernel::new(&self.layout, &self.cache, name, spirv, &constants)?);
+        let mut kernels = kernels();
+        if kernels.len() >= MOST_KERNELS {
+            // Frames hold on to those they use.
+            kernels.clear();
+        }
         kernels.insert((code.name, features), kernel.clone());
         Ok(kernel)
     }

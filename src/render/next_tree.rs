@@ -5,6 +5,7 @@ use crate::bvh::Quality;
 use crate::report;
 use crate::scene::Soup;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A tree is refitted for the next frame of a sequence as long as that makes it cost at most so many times what it did when it was built.
 /// By the heuristic a ray then takes 1.3 times as long; a sequence's frame traces many rays, so that a new tree soon pays.
@@ -47,8 +48,10 @@ impl Tree {
 
     /// The same trees with the boxes of a soup whose triangles have moved.
     fn refitted(&self, soup: &Soup, rebase: Rebase) -> Self {
-        let part = |(part, range): (&Part, &std::ops::Range<usize>)| {
-            let (triangles, rebase) = part_space(soup, range, rebase);
+        let part = |(part, range): (&Part, &Range<usize>)| {
+            let rebase = part_space(soup, range, rebase);
+            let triangles: Vec<_> =
+                soup.positions[range.clone()].par_iter().map(|corners| rebase.triangle(corners)).collect();
             let mut bvh = part.bvh.clone();
             bvh.refit(&triangles);
             Part { bvh, rebase, built_cost: Some(part.built_cost()) }

@@ -4,6 +4,7 @@
 use super::frame::Frame;
 use super::ray_sets::{BenchRay, SetKind};
 use super::textures::Textures;
+use super::tracers::Kernels;
 use super::{upload, Options, Plan, Rebase, Renderer};
 use crate::error::{Error, Result};
 use crate::layout::{
@@ -158,7 +159,7 @@ impl Tracer<'_> {
 
     /// One timed submission: wall-clock and device milliseconds.
     fn run(&self, kind: SetKind, rays: u32) -> Result<(f64, f64)> {
-        let Frame { renderer, trace, bindings, .. } = &self.frame;
+        let Frame { renderer, kernels: Kernels { trace, .. }, bindings, .. } = &self.frame;
         let wave = Step { pixels: rays, samples: 1, finish: 1, ..Step::default() };
         let start = Instant::now();
         let mut commands = Commands::new(&renderer.device, 4)?;

@@ -13,14 +13,30 @@ pub(super) struct Tracers {
     pub reflection: Option<Arc<Kernel>>,
 }
 
-impl Tracers {
+/// All kernels of a frame.
+pub(super) struct Kernels {
+    pub trace: Tracers,
+    pub prepare: Arc<Kernel>,
+    pub shade: Arc<Kernel>,
+    pub resolve: Arc<Kernel>,
+}
+
+impl Kernels {
+    /// Makes them side by side.
     pub fn new(renderer: &Renderer, features: Features) -> Result<Self> {
         let kernel = |code| renderer.kernel(code, features);
-        Ok(Self {
-            primary: kernel(&kernels::PRIMARY)?,
-            shadow: features.shadows.then(|| kernel(&kernels::SHADOW)).transpose()?,
-            reflection: features.rays_go_on().then(|| kernel(&kernels::REFLECTION)).transpose()?,
-        })
+        let (trace, rest) = rayon::join(
+            || -> Result<_> {
+                Ok(Tracers {
+                    primary: kernel(&kernels::PRIMARY)?,
+                    shadow: features.shadows.then(|| kernel(&kernels::SHADOW)).transpose()?,
+                    reflection: features.rays_go_on().then(|| kernel(&kernels::REFLECTION)).transpose()?,
+                })
+            },
+            || -> Result<_> { Ok([kernel(&kernels::PREPARE)?, kernel(&kernels::SHADE)?, kernel(&kernels::RESOLVE)?]) },
+        );
+        let [prepare, shade, resolve] = rest?;
+        Ok(Self { trace: trace?, prepare, shade, resolve })
     }
 }
 

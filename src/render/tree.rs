@@ -10,6 +10,7 @@ use crate::report;
 use crate::scene::{bounds_of, box_corners, Placement, Projection, Soup, View};
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The trees over a soup.
 pub struct Tree {
@@ -47,16 +48,18 @@ impl Part {
     }
 }
 
-/// The triangles of a part as the device sees them, and the space that they are in.
-pub(super) fn part_space(soup: &Soup, range: &std::ops::Range<usize>, world: Rebase) -> (Vec<[Vec3; 3]>, Rebase) {
+/// The space of a part on the device.
+pub(super) fn part_space(soup: &Soup, range: &Range<usize>, world: Rebase) -> Rebase {
     let positions = &soup.positions[range.clone()];
     let own = || {
         let (lo, hi) = if positions.is_empty() { Default::default() } else { bounds_of(positions.as_flattened()) };
         Rebase::new(lo, hi, (lo + hi) / 2.0)
     };
-    let rebase = if soup.is_flat() { world } else { own() };
-    let local = |corners: &[DVec3; 3]| corners.map(|corner| rebase.point(corner));
-    (positions.par_iter().map(local).collect(), rebase)
+    if soup.is_flat() {
+        world
+    } else {
+        own()
+    }
 }
 
 /// The tree over the placements of parts; `None` for a flat soup.
@@ -129,6 +132,11 @@ impl Rebase {
         self.exact(point).as_vec3()
     }
 
+    /// The corners of a triangle.
+    pub fn triangle(&self, corners: &[DVec3; 3]) -> [Vec3; 3] {
+        corners.map(|corner| self.point(corner))
+    }
+
     /// A point, not yet rounded.
     fn exact(&self, point: DVec3) -> DVec3 {
         self.rotation * ((point - self.origin) * self.scale)
@@ -176,9 +184,14 @@ impl DeviceTree {
 impl Tree {
     /// Builds the trees over a soup in a world of the device's.
     pub fn build(soup: &Soup, rebase: Rebase, quality: Quality) -> Self {
-        let part = |range: &std::ops::Range<usize>| {
-            let (triangles, rebase) = part_space(soup, range, rebase);
-            Part { bvh: Bvh::over_triangles(&triangles, quality), rebase, built_cost: None }
+        let part = |range: &Range<usize>| {
+            let rebase = part_space(soup, range, rebase);
+            let positions = &soup.positions[range.clone()];
+            Part {
+                bvh: Bvh::over(range.len(), |index| rebase.triangle(&positions[index]), quality),
+                rebase,
+                built_cost: None,
+            }
         };
         let parts: Vec<Part> = soup.parts.par_iter().map(part).collect();
         let upper = upper_tree(soup, &parts, rebase);

@@ -14,6 +14,9 @@ use crate::vulkan::{Access, Buffer, Commands, Memory, Usage};
 use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
+/// A triangle as kernels fetch it: its corners, with numbers of its own behind each.
+type TriangleTexels = [[u32; 4]; TRIANGLE_TEXELS as usize];
+
 /// All that is uploaded.
 #[derive(Clone, Copy)]
 pub(super) struct Scene<'a> {
@@ -32,7 +35,12 @@ impl Scene<'_> {
         let make = |name, bytes: &[u8], usage| Buffer::with_data(&renderer.device, name, bytes, usage);
         Some(match slot {
             binding::NODES => make("nodes", bytemuck::cast_slice(&self.tree.records), Usage::Fetch),
-            binding::TRIANGLES => make("triangles", bytemuck::cast_slice(&self.triangles()), Usage::Fetch),
+            binding::TRIANGLES => {
+                let bytes = self.tree.order.len() * size_of::<TriangleTexels>();
+                Buffer::filled(&renderer.device, "triangles", bytes as u64, Usage::Fetch, |target| {
+                    self.write_triangles(bytemuck::cast_slice_mut(target));
+                })
+            }
             binding::ATTRIBUTES => make("attributes", bytemuck::cast_slice(&self.attributes(features)), Usage::Fetch),
             binding::TEXTURES => make("textures", bytemuck::cast_slice(&self.textures.records), Usage::Fetch),
             binding::PIXELS => make("pixels", bytemuck::cast_slice(&self.textures.pixels), Usage::Fetch),
@@ -61,8 +69,8 @@ impl Scene<'_> {
         })
     }
 
-    /// Three texels a triangle in leaf order.
-    fn triangles(&self) -> Vec<[[u32; 4]; 3]> {
+    /// Writes triangles in leaf order.
+    fn write_triangles(&self, target: &mut [TriangleTexels]) {
         let soup = self.soup;
         let precedence = scene::precedence(self.scene, soup);
         let triangle = |primitive: &u32| {
@@ -81,7 +89,7 @@ impl Scene<'_> {
             let texel = |corner: usize| with_bits(rebase.point(soup.positions[index][corner]), extra[corner]);
             [texel(0), texel(1), texel(2)]
         };
-        self.tree.order.par_iter().map(triangle).collect()
+        target.par_iter_mut().zip(&self.tree.order).for_each(|(texels, primitive)| *texels = triangle(primitive));
     }
 
     /// What primitives have besides positions, kind after kind, three texels each; kinds that the scene needs and lacks are zeros.
@@ -275,9 +283,8 @@ pub(super) fn frame_buffer(renderer: &Renderer, slot: u32, name: &'static str, b
 
 /// Makes a buffer that the device copies from; never empty.
 pub(super) fn staging(renderer: &Renderer, bytes: &[u8]) -> Result<Buffer> {
-    let mut buffer = Buffer::new(&renderer.device, "staging", bytes.len() as u64, Usage::Storage, Memory::Upload)?;
-    buffer.write(bytes)?;
-    Ok(buffer)
+    let copy = |target: &mut [u8]| target.copy_from_slice(bytes);
+    Buffer::uploaded(&renderer.device, "staging", bytes.len() as u64, Usage::Storage, copy)
 }
 
 /// A copy of a whole buffer that the host can read.

@@ -256,44 +256,45 @@ impl Soup {
         let places = if determinant < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
         let can_be_drawn = |point: &DVec3| point.is_finite() && point.abs().max_element() < 1e30;
         let are_all_drawn = points.par_iter().all(can_be_drawn);
-        let is_drawn =
-            |corners: &[u32; 3]| are_all_drawn || corners.iter().all(|corner| can_be_drawn(&points[*corner as usize]));
-        let drawn: Vec<usize> =
-            (0..mesh.triangles.len()).into_par_iter().filter(|index| is_drawn(&mesh.triangles[*index])).collect();
-        let corners = |index: &usize| places.map(|place: usize| mesh.triangles[*index][place] as usize);
+        let is_drawn = |corners: &[u32; 3]| corners.iter().all(|corner| can_be_drawn(&points[*corner as usize]));
+        let all = 0..mesh.triangles.len();
+        let some: Option<Vec<usize>> = (!are_all_drawn)
+            .then(|| all.clone().into_par_iter().filter(|index| is_drawn(&mesh.triangles[*index])).collect());
+        let count = some.as_ref().map_or(all.len(), Vec::len);
+        let drawn = || (0..count).into_par_iter().map(|place| some.as_ref().map_or(place, |some| some[place]));
+        let corners = |index: usize| places.map(|place: usize| mesh.triangles[index][place] as usize);
         // A normal without a direction makes the whole triangle flat.
-        let corner_normals = |index: &usize| match normals.is_empty() {
+        let corner_normals = |index: usize| match normals.is_empty() {
             true => [Vec3::ZERO; 3],
             false => corners(index).map(|corner| normals[corner]),
         };
         let is_smooth = |normals: [Vec3; 3]| normals.iter().all(|normal| normal.length_squared() > 0.5);
-        self.positions.par_extend(drawn.par_iter().map(|index| corners(index).map(|corner| points[corner])));
-        self.materials.extend(drawn.iter().map(|_| mesh.material as u32));
+        self.positions.par_extend(drawn().map(|index| corners(index).map(|corner| points[corner])));
+        self.materials.resize(self.materials.len() + count, mesh.material as u32);
         if smooth {
-            self.normals.par_extend(drawn.par_iter().map(corner_normals));
+            self.normals.par_extend(drawn().map(corner_normals));
         }
         if colored {
             let color = |corner: usize| mesh.colors.get(corner).copied().unwrap_or(Vec4::ONE);
-            self.colors.par_extend(drawn.par_iter().map(|index| corners(index).map(color)));
+            self.colors.par_extend(drawn().map(|index| corners(index).map(color)));
         }
         if textured {
             let texcoord = |corner: usize| mesh.texcoords.get(corner).copied().unwrap_or_default();
-            self.texcoords.par_extend(drawn.par_iter().map(|index| corners(index).map(texcoord)));
+            self.texcoords.par_extend(drawn().map(|index| corners(index).map(texcoord)));
         }
         if tangents {
-            let own = |index: &usize| mesh.tangents.get(*index).copied().unwrap_or_default();
-            self.tangents
-                .par_extend(drawn.par_iter().map(|index| places.map(|place| world_tangent(own(index)[place]))));
+            let own = |index: usize| mesh.tangents.get(index).copied().unwrap_or_default();
+            self.tangents.par_extend(drawn().map(|index| places.map(|place| world_tangent(own(index)[place]))));
         }
         let material = &scene.materials[mesh.material];
-        self.flags.par_extend(drawn.par_iter().map(|index| TriangleFlags {
+        self.flags.par_extend(drawn().map(|index| TriangleFlags {
             single_sided: !material.double_sided,
             smooth: is_smooth(corner_normals(index)),
             colored: !mesh.colors.is_empty(),
             see_through: material.is_see_through(),
             thin: is_thin(&corners(index).map(|corner| points[corner])),
         }));
-        Added { flattened: false, not_finite: mesh.triangles.len() - drawn.len() }
+        Added { flattened: false, not_finite: mesh.triangles.len() - count }
     }
 
     /// The first part holds what stands alone, in world space.

@@ -1,8 +1,9 @@
 //! Buffers: memory, optional texel view, upload and read-back.
 
 use super::device::lock;
-use super::{failed, Access, Commands, Device, Fetch};
+use super::{failed, Access, Commands, Device, DeviceKind, Fetch};
 use crate::error::{Error, Result};
+use crate::memory::prefer_huge_pages;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::MemoryLocation;
@@ -94,29 +95,55 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Makes a buffer that holds `data`, written directly where the host sees device memory, through a staging buffer
-    /// where it does not; without data, of the least size and undefined content.
+    /// Makes a buffer that holds `data`; without data, of the least size and undefined content.
     ///
     /// # Errors
     /// As [`Buffer::new`].
     pub fn with_data(device: &Arc<Device>, name: &'static str, data: &[u8], usage: Usage) -> Result<Self> {
-        let bytes = data.len() as u64;
+        Self::filled(device, name, data.len() as u64, usage, |target| target.copy_from_slice(data))
+    }
+
+    /// Makes a buffer of so many bytes, which `fill` writes, each one, and does not read: in the device's own memory where the host sees
+    /// it, in a staging buffer where it does not. Of none, it has the least size and undefined content.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`].
+    pub fn filled(
+        device: &Arc<Device>,
+        name: &'static str,
+        bytes: u64,
+        usage: Usage,
+        fill: impl FnOnce(&mut [u8]),
+    ) -> Result<Self> {
         if bytes == 0 {
             return Self::new(device, name, 0, usage, Memory::Device);
         }
         if !device.staged {
-            let mut buffer = Self::new(device, name, bytes, usage, Memory::Upload)?;
-            buffer.write(data)?;
-            return Ok(buffer);
+            return Self::uploaded(device, name, bytes, usage, fill);
         }
-        let mut staging = Self::new(device, "staging", bytes, Usage::Storage, Memory::Upload)?;
-        staging.write(data)?;
+        let staging = Self::uploaded(device, "staging", bytes, Usage::Storage, fill)?;
         let buffer = Self::new(device, name, bytes, usage, Memory::Device)?;
         let mut commands = Commands::new(device, 0)?;
         commands.copy(&staging, &buffer, 0, bytes);
         // Buffer: the copy wrote, kernels of later submissions read.
         commands.barrier(Access::Transfer, Access::ShaderReadWrite);
         commands.submit_and_wait()?;
+        Ok(buffer)
+    }
+
+    /// Makes a buffer in memory that the host sees, filled like [`Buffer::filled`].
+    ///
+    /// # Errors
+    /// As [`Buffer::new`].
+    pub fn uploaded(
+        device: &Arc<Device>,
+        name: &'static str,
+        bytes: u64,
+        usage: Usage,
+        fill: impl FnOnce(&mut [u8]),
+    ) -> Result<Self> {
+        let mut buffer = Self::new(device, name, bytes, usage, Memory::Upload)?;
+        fill(buffer.mapped(bytes)?);
         Ok(buffer)
     }
 
@@ -149,6 +176,9 @@ impl Buffer {
         count.now += allocation.size();
         count.peak = count.peak.max(count.now);
         drop(count);
+        if let (DeviceKind::Cpu, Some(mapped)) = (device.info.kind, allocation.mapped_ptr()) {
+            prefer_huge_pages(mapped.as_ptr().cast(), allocation.size() as usize);
+        }
         self.allocation = Some(allocation);
         bound.map_err(failed(format!("bind memory of {}", self.name)))
     }
@@ -165,17 +195,11 @@ impl Buffer {
         Ok(())
     }
 
-    /// Writes `data` at the start.
-    ///
-    /// # Errors
-    /// `Device` when the buffer is not in `Upload` memory or too small.
-    pub fn write(&mut self, data: &[u8]) -> Result<()> {
-        let name = self.name;
+    /// The host's view of the first bytes, to be written.
+    fn mapped(&mut self, bytes: u64) -> Result<&mut [u8]> {
         let mapped = self.allocation.as_mut().and_then(Allocation::mapped_slice_mut);
-        let target = mapped.and_then(|mapped| mapped.get_mut(..data.len()));
-        target
-            .map(|target| target.copy_from_slice(data))
-            .ok_or_else(|| Error::Device(format!("cannot write {} bytes to {name}", data.len())))
+        let target = mapped.and_then(|mapped| mapped.get_mut(..bytes as usize));
+        target.ok_or_else(|| Error::Device(format!("cannot write {bytes} bytes to {}", self.name)))
     }
 
     /// The host's view of the whole buffer.

@@ -3,21 +3,25 @@
 use super::{meshopt, Document, Warnings};
 use ::gltf::json::{Buffer, Root};
 use base64::{engine::general_purpose, Engine};
+use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Component, Path};
 
 /// Largest file that is read, so that a declared length alone allocates nothing absurd.
 pub(super) const LARGEST: u64 = 1 << 34;
 
+/// Bytes of a buffer, or why there are none.
+pub(super) type Content<'a> = Result<Cow<'a, [u8]>, String>;
+
 /// Loads every buffer, each at least as long as it declares, together at most `left` bytes: many may name the same file. One
 /// that cannot be had refuses the file only when something that is drawn needs it.
-pub(super) fn load(
+pub(super) fn load<'a>(
     root: &Root,
-    binary: Option<&[u8]>,
+    binary: Option<&'a [u8]>,
     folder: Option<&Path>,
     mut left: u64,
     warnings: &mut Warnings,
-) -> Vec<Result<Vec<u8>, String>> {
+) -> Vec<Content<'a>> {
     let fallbacks = meshopt::fallbacks(root, binary.is_some());
     let mut buffers = Vec::new();
     for (index, buffer) in root.buffers.iter().enumerate() {
@@ -69,12 +73,7 @@ impl Document<'_> {
 }
 
 /// Bytes of a buffer from `offset` on.
-pub(super) fn slice(
-    buffers: &[Result<Vec<u8>, String>],
-    buffer: usize,
-    offset: u64,
-    length: u64,
-) -> Result<&[u8], String> {
+pub(super) fn slice<'a>(buffers: &'a [Content], buffer: usize, offset: u64, length: u64) -> Result<&'a [u8], String> {
     let bytes = buffers.get(buffer).ok_or_else(|| format!("there is no buffers[{buffer}]"))?;
     let bytes = bytes.as_ref().map_err(Clone::clone)?;
     let whole = usize::try_from(offset).ok().zip(usize::try_from(length).ok());
@@ -83,12 +82,16 @@ pub(super) fn slice(
 }
 
 /// The bytes of a buffer, at least as many as it declares if there are, and how many there are.
-fn load_one(buffer: &Buffer, binary: Option<&[u8]>, folder: Option<&Path>) -> Result<(Vec<u8>, u64), String> {
+fn load_one<'a>(
+    buffer: &Buffer,
+    binary: Option<&'a [u8]>,
+    folder: Option<&Path>,
+) -> Result<(Cow<'a, [u8]>, u64), String> {
     let declared = buffer.byte_length.0;
     match (&buffer.uri, binary) {
         _ if declared == 0 || declared > LARGEST => Err(format!("byteLength {declared} is not a sensible length")),
-        (Some(uri), _) => from_uri(uri, folder, declared),
-        (None, Some(binary)) => Ok((binary[..binary.len().min(declared as usize)].to_vec(), binary.len() as u64)),
+        (Some(uri), _) => from_uri(uri, folder, declared).map(|(bytes, length)| (bytes.into(), length)),
+        (None, Some(binary)) => Ok((binary[..binary.len().min(declared as usize)].into(), binary.len() as u64)),
         (None, None) => Err("it has no uri, and there is no BIN chunk for it".into()),
     }
 }
@@ -138,7 +141,7 @@ fn read_beside(uri: &str, folder: Option<&Path>, most: u64) -> Result<(Vec<u8>, 
     if !data.is_file() || data.len() > LARGEST {
         return Err(refuse(&"it is no file of a sensible size"));
     }
-    let mut bytes = Vec::new();
+    let mut bytes = Vec::with_capacity(data.len().min(most) as usize);
     let file = std::fs::File::open(&path).map_err(|error| refuse(&error))?;
     file.take(most).read_to_end(&mut bytes).map_err(|error| refuse(&error))?;
     // A file that has shrunk meanwhile has no more than was read.

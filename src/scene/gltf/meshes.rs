@@ -88,9 +88,10 @@ impl Document<'_> {
         // Of strips and fans nearly every corner becomes a triangle; a normal map adds tangents.
         let most = if mode == Mode::Triangles { corners.len() / 3 } else { corners.len() } as u64;
         self.spend_numbers(most * if maps.normal.is_some() { 3 + TANGENT_NUMBERS } else { 3 })?;
-        let triangles = triangles(mode, &corners);
-        if triangles.is_empty() || (mode == Mode::Triangles && corners.len() % 3 != 0) {
-            self.warnings.add(format!("ignored: {place} has {} corners, not whole triangles", corners.len()));
+        let corner_count = corners.len();
+        let triangles = triangles(mode, corners);
+        if triangles.is_empty() || (mode == Mode::Triangles && corner_count % 3 != 0) {
+            self.warnings.add(format!("ignored: {place} has {corner_count} corners, not whole triangles"));
         }
         let in_range = |color: &Vec4| color.cmpge(Vec4::ZERO).all() && color.cmple(Vec4::ONE).all();
         if !colors.iter().all(in_range) {
@@ -194,7 +195,7 @@ fn both_sets(first: Option<Vec<Vec2>>, second: Option<Vec<Vec2>>) -> Vec<[Vec2; 
 }
 
 /// Triangles of a list, strip or fan (glTF 2.0, 3.7.2.1); every second one of a strip is turned round.
-fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
+fn triangles(mode: Mode, corners: Vec<u32>) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => corners
             .windows(3)
@@ -202,7 +203,9 @@ fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
             .map(|(index, w)| if index % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] })
             .collect(),
         Mode::TriangleFan => corners.windows(2).skip(1).map(|w| [corners[0], w[0], w[1]]).collect(),
-        _ => corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+        // The very memory where that is possible.
+        _ => bytemuck::try_cast_vec(corners)
+            .unwrap_or_else(|(_, corners)| corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()),
     }
 }
 
@@ -212,9 +215,10 @@ mod tests {
 
     #[test]
     fn strips_turn_and_fans_share_their_first_corner() {
-        assert_eq!(triangles(Mode::TriangleStrip, &[0, 1, 2, 3]), [[0, 1, 2], [1, 3, 2]]);
-        assert_eq!(triangles(Mode::TriangleFan, &[5, 1, 2, 3]), [[5, 1, 2], [5, 2, 3]]);
-        assert_eq!(triangles(Mode::Triangles, &[0, 1, 2, 3, 4]), [[0, 1, 2]]);
-        assert!(triangles(Mode::TriangleFan, &[]).is_empty() && triangles(Mode::TriangleStrip, &[1]).is_empty());
+        assert_eq!(triangles(Mode::TriangleStrip, vec![0, 1, 2, 3]), [[0, 1, 2], [1, 3, 2]]);
+        assert_eq!(triangles(Mode::TriangleFan, vec![5, 1, 2, 3]), [[5, 1, 2], [5, 2, 3]]);
+        assert_eq!(triangles(Mode::Triangles, vec![0, 1, 2, 3, 4, 5]), [[0, 1, 2], [3, 4, 5]]);
+        assert_eq!(triangles(Mode::Triangles, vec![0, 1, 2, 3, 4]), [[0, 1, 2]]);
+        assert!(triangles(Mode::TriangleFan, vec![]).is_empty() && triangles(Mode::TriangleStrip, vec![1]).is_empty());
     }
 }

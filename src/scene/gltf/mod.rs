@@ -129,7 +129,7 @@ struct Document<'a> {
     animations: Vec<animation::Declared>,
     skins: Vec<skin::Declared>,
     /// Content of each buffer, or why there is none.
-    buffers: Vec<Result<Vec<u8>, String>>,
+    buffers: Vec<buffers::Content<'a>>,
     /// Content of the buffer views that are compressed.
     decompressed: meshopt::Decompressed,
     /// The compressed mesh that was read last: its attributes are asked for one by one.
@@ -183,7 +183,7 @@ impl<'a> Document<'a> {
     }
 
     /// Loads all buffers and decompresses what is compressed.
-    fn load(&mut self, binary: Option<&[u8]>, folder: Option<&'a Path>) {
+    fn load(&mut self, binary: Option<&'a [u8]>, folder: Option<&'a Path>) {
         self.folder = folder;
         let most_bytes = self.most_numbers.saturating_mul(4);
         self.buffers = buffers::load(&self.root, binary, folder, most_bytes, &mut self.warnings);

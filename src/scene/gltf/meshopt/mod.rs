@@ -8,6 +8,7 @@ mod filters;
 mod indices;
 mod input;
 
+use super::buffers::Content;
 use super::{buffers, Warnings};
 use ::gltf::json::Root;
 use filters::Filter;
@@ -48,12 +49,7 @@ pub(super) type Decompressed = BTreeMap<usize, Result<Vec<u8>, String>>;
 
 /// Decompresses every view that is compressed, all together to `left` bytes at most: many may name the same data. One that cannot be had refuses the file only when something that is drawn
 /// needs it.
-pub(super) fn decompress(
-    root: &Root,
-    buffers: &[Result<Vec<u8>, String>],
-    mut left: u64,
-    warnings: &mut Warnings,
-) -> Decompressed {
+pub(super) fn decompress(root: &Root, buffers: &[Content], mut left: u64, warnings: &mut Warnings) -> Decompressed {
     let mut decompressed = Decompressed::new();
     for (index, view) in root.buffer_views.iter().enumerate() {
         let Some((name, extension)) = view.extensions.as_ref().and_then(|all| own(&all.others)) else { continue };
@@ -97,7 +93,7 @@ fn own(others: &Map<String, Value>) -> Option<(&'static str, &Value)> {
     NAMES.into_iter().find_map(|name| others.get(name).map(|value| (name, value)))
 }
 
-fn decompress_one(extension: &Value, buffers: &[Result<Vec<u8>, String>], left: &mut u64) -> Result<Vec<u8>, String> {
+fn decompress_one(extension: &Value, buffers: &[Content], left: &mut u64) -> Result<Vec<u8>, String> {
     let view = Compressed::deserialize(extension).map_err(|error| error.to_string())?;
     let bytes = buffers::slice(buffers, view.buffer, view.byte_offset, view.byte_length)?;
     let (count, stride) = (view.count, view.byte_stride);
