@@ -90,9 +90,21 @@ impl ObjectSplit {
     }
 }
 
+/// Of so many references each half is partitioned by itself, in parallel.
+const PARALLEL: usize = 1 << 17;
+
 /// Moves what goes left to the front and returns how much that is. Without a branch, which no processor could predict: each is
 /// swapped to the border, which it then moves or not.
-fn partition(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool) -> usize {
+fn partition(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool + Copy + Sync) -> usize {
+    if references.len() >= PARALLEL {
+        let middle = references.len() / 2;
+        let (front, back) = references.split_at_mut(middle);
+        let (front_left, back_left) = rayon::join(|| partition(front, is_left), || partition(back, is_left));
+        // What goes right in the front changes places with what goes left in the back.
+        let moved = (middle - front_left).min(back_left);
+        front[front_left..front_left + moved].swap_with_slice(&mut back[back_left - moved..back_left]);
+        return front_left + back_left;
+    }
     let mut left = 0;
     for index in 0..references.len() {
         let moves = is_left(&references[index]);

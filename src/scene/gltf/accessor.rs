@@ -28,6 +28,41 @@ struct Layout<'a> {
     stride: usize,
 }
 
+/// Components of `count` elements, each converted.
+fn converted<T: Component>(
+    layout: &Layout,
+    kind: ComponentType,
+    count: usize,
+    components: usize,
+    convert: &(impl Fn(ComponentType, &[u8]) -> T + Sync),
+) -> Vec<T> {
+    let element = kind.size() * components;
+    let mut values = vec![T::zeroed(); count * components];
+    values.par_chunks_mut(AT_ONCE * components).enumerate().for_each(|(chunk, values)| {
+        for (i, values) in values.chunks_exact_mut(components).enumerate() {
+            let bytes = &layout.bytes[(chunk * AT_ONCE + i) * layout.stride..][..element];
+            for (value, component) in values.iter_mut().zip(bytes.chunks_exact(kind.size())) {
+                *value = convert(kind, component);
+            }
+        }
+    });
+    values
+}
+
+/// What components are read as.
+trait Component: bytemuck::Pod + Send + Sync {
+    /// The type that is stored in the same way.
+    const KIND: ComponentType;
+}
+
+impl Component for f32 {
+    const KIND: ComponentType = ComponentType::F32;
+}
+
+impl Component for u32 {
+    const KIND: ComponentType = ComponentType::U32;
+}
+
 /// Reads one component as a number; integers are divided by their largest value if normalised (glTF 2.0, 3.11).
 fn number(kind: ComponentType, normalized: bool, bytes: &[u8]) -> f32 {
     let scaled = |value: f32, largest: f32| if normalized { (value / largest).max(-1.0) } else { value };
@@ -57,14 +92,14 @@ impl Document<'_> {
         self.spend(index)?;
         let accessor = &self.root.accessors[index];
         let normalized = accessor.normalized;
-        self.read(index, 0.0, |kind, bytes| number(kind, normalized, bytes))
+        self.read(index, |kind, bytes| number(kind, normalized, bytes))
     }
 
     /// Elements of a scalar accessor of unsigned integers.
     pub fn indices(&self, index: usize) -> Result<Vec<u32>> {
         let refuse = |message: &str| Err(self.refuse(format!("accessors[{index}]: {message}")));
         self.spend(index)?;
-        let elements = self.read(index, 0, integer)?;
+        let elements = self.read(index, integer)?;
         let restart = match &self.root.accessors[index].component_type {
             Checked::Valid(kind) if kind.0 == ComponentType::U8 => u32::from(u8::MAX),
             Checked::Valid(kind) if kind.0 == ComponentType::U16 => u32::from(u16::MAX),
@@ -83,7 +118,7 @@ impl Document<'_> {
     /// Elements of an accessor of four-component unsigned integers: the joints of each vertex.
     pub fn joints(&self, index: usize) -> Result<Vec<u32>> {
         self.spend(index)?;
-        let elements = self.read(index, 0, integer)?;
+        let elements = self.read(index, integer)?;
         let kind = &self.root.accessors[index].component_type;
         let fits = matches!(kind, Checked::Valid(kind) if matches!(kind.0, ComponentType::U8 | ComponentType::U16));
         if elements.components != 4 || !fits {
@@ -137,13 +172,12 @@ impl Document<'_> {
 
     /// Elements as floats that are looked at and not kept.
     pub fn glance(&self, index: usize, normalized: bool) -> Option<Elements<f32>> {
-        self.read(index, 0.0, |kind, bytes| number(kind, normalized, bytes)).ok()
+        self.read(index, |kind, bytes| number(kind, normalized, bytes)).ok()
     }
 
-    fn read<T: Copy + Send + Sync>(
+    fn read<T: Component>(
         &self,
         index: usize,
-        zero: T,
         convert: impl Fn(ComponentType, &[u8]) -> T + Sync,
     ) -> Result<Elements<T>> {
         let accessor = &self.root.accessors[index];
@@ -162,19 +196,15 @@ impl Document<'_> {
                 let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
                 let layout = self.layout(index, view, offset, accessor.count.0, element)?;
                 let count = accessor.count.0 as usize;
-                let mut values = vec![zero; count * components];
-                values.par_chunks_mut(AT_ONCE * components).enumerate().for_each(|(chunk, values)| {
-                    for (i, values) in values.chunks_exact_mut(components).enumerate() {
-                        let bytes = &layout.bytes[(chunk * AT_ONCE + i) * layout.stride..][..element];
-                        for (value, component) in values.iter_mut().zip(bytes.chunks_exact(kind.size())) {
-                            *value = convert(kind, component);
-                        }
-                    }
-                });
-                values
+                let is_as_in_memory = kind == T::KIND && layout.stride == element && cfg!(target_endian = "little");
+                if is_as_in_memory {
+                    bytemuck::pod_collect_to_vec(&layout.bytes[..count * element])
+                } else {
+                    converted(&layout, kind, count, components, &convert)
+                }
             }
             None if accessor.count.0 > MOST_UNBACKED => return Err(refuse("it has no data for so many elements")),
-            None => vec![zero; accessor.count.0 as usize * components],
+            None => vec![T::zeroed(); accessor.count.0 as usize * components],
         };
         let mut elements = Elements { components, values };
         self.replace_sparse(index, kind, &mut elements, convert)?;
