@@ -210,6 +210,40 @@ mod tests {
     use super::*;
     use glam::Vec3;
 
+    /// Points along a line, in no order.
+    fn points(count: u32) -> Vec<Reference> {
+        let place = |primitive: u32| Vec3::splat((primitive.wrapping_mul(2_654_435_761) >> 12) as f32);
+        (0..count).map(|primitive| Reference::new(place(primitive), place(primitive), primitive)).collect()
+    }
+
+    #[test]
+    fn large_and_small_nodes_are_partitioned_without_loss() {
+        for count in [1, 2, 1000, PARALLEL as u32, 5 * PARALLEL as u32 + 7] {
+            let mut references = points(count);
+            // As many on either side, far more on one, all on one.
+            for share in [0.5, 0.9, 0.1, 0.0, 1.1] {
+                let is_left = |one: &Reference| one.doubled_center().x < share * 2_097_152.0;
+                let expected = references.iter().filter(|one| is_left(one)).count();
+                let left = partition(&mut references, is_left);
+                assert_eq!(left, expected);
+                assert!(references[..left].iter().all(is_left) && !references[left..].iter().any(is_left));
+            }
+            let mut primitives: Vec<u32> = references.iter().map(Reference::primitive).collect();
+            primitives.sort_unstable();
+            assert_eq!(primitives, (0..count).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn few_references_are_put_in_order() {
+        for count in 1..=SWEEP {
+            let references = points(count as u32);
+            let mut expected: Vec<(u64, usize)> = (0..count).map(|index| (key(&references[index], 2), index)).collect();
+            expected.sort_unstable();
+            assert_eq!(sorted(&references, 2)[..count], expected);
+        }
+    }
+
     #[test]
     fn keys_are_in_the_order_of_centres_then_of_primitives() {
         let centers = [f32::MIN, -2.0, -1e-40, 0.0, 1e-40, 2.0, 3.0e38];

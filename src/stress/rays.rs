@@ -32,6 +32,20 @@ impl Stress<'_> {
         toward: DVec3,
         make: impl FnOnce(&Prepared, usize) -> Vec<Ray>,
     ) -> Result<(Prepared, Vec<Ray>, Vec<Met>)> {
+        let (prepared, rays, [met]) = self.answers(name, scene, eye, toward, [SetKind::Diffuse], make)?;
+        Ok((prepared, rays, met))
+    }
+
+    /// As [`Stress::nearest`], each kind of ray's answers.
+    fn answers<const KINDS: usize>(
+        &self,
+        name: &str,
+        scene: &Scene,
+        eye: DVec3,
+        toward: DVec3,
+        kinds: [SetKind; KINDS],
+        make: impl FnOnce(&Prepared, usize) -> Vec<Ray>,
+    ) -> Result<(Prepared, Vec<Ray>, [Vec<Met>; KINDS])> {
         let size = self.rays_at_once();
         let camera = CameraChoice::LookAt { eye, target: Some(toward) };
         let options = Options { size, camera, ..self.options.clone() };
@@ -41,8 +55,13 @@ impl Stress<'_> {
         if let Some(folder) = &self.settings.export {
             export(folder, &format!("{}-{name}", self.case).replace(' ', "-"), &prepared, &tree, &rays)?;
         }
-        let trace = self.renderer.tracer(scene, &prepared, &tree)?.trace(SetKind::Diffuse, &rays, 1, &options)?;
-        Ok((prepared, rays, trace.met))
+        let mut tracer = self.renderer.tracer(scene, &prepared, &tree)?;
+        let mut answers = [const { Vec::new() }; KINDS];
+        for (met, kind) in answers.iter_mut().zip(kinds) {
+            *met = tracer.trace(kind, &rays, 1, &options)?.met;
+        }
+        drop(tracer);
+        Ok((prepared, rays, answers))
     }
 }
 
@@ -245,8 +264,10 @@ fn leaving(stress: &Stress, name: &str, mesh: Mesh, side: f64, angle: f64, eye: 
         };
         (0..count).map(ray).collect()
     };
-    let (_, rays, met) = stress.nearest(name, &scene, transform.transform_point3(DVec3::Y * eye), DVec3::Z, make)?;
+    let eye = transform.transform_point3(DVec3::Y * eye);
+    let kinds = [SetKind::Diffuse, SetKind::Shadow];
+    let (_, rays, answers) = stress.answers(name, &scene, eye, DVec3::Z, kinds, make)?;
     let meets = |met: &Met| *met != Met::Nothing;
-    let wrong = met.iter().filter(|met| meets(met) != (side < 0.0)).count();
-    Ok(Finding::none_of(rays.len() as u64, wrong as u64))
+    let wrong = answers.iter().flatten().filter(|met| meets(met) != (side < 0.0)).count();
+    Ok(Finding::none_of((answers.len() * rays.len()) as u64, wrong as u64))
 }
