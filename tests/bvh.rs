@@ -219,3 +219,19 @@ fn a_refitted_tree_holds_triangles_that_moved() {
         bvh.validate(&boxes_of(&waved[..few]), Some(&waved[..few])).unwrap();
     }
 }
+
+/// Long diagonal triangles in thousands, which spatial splits cut.
+#[test]
+fn trees_over_real_models_hold_every_triangle() {
+    let Some(corpus) = super::support::corpus() else { return };
+    let scenes = corpus.join("../bench/scenes");
+    for name in ["s1", "s4"] {
+        let scene = glimt::scene::gltf::read(&scenes.join(name).with_extension("glb"), &Default::default()).unwrap();
+        let soup = glimt::scene::Soup::of(&scene).unwrap();
+        let triangles: Vec<[Vec3; 3]> =
+            soup.positions.iter().map(|corners| corners.map(|corner| corner.as_vec3())).collect();
+        let bvh = Bvh::over_triangles(&triangles, Quality::Best);
+        println!("{name}: {} references of {} triangles", bvh.order.len(), triangles.len());
+        bvh.validate(&boxes_of(&triangles), Some(&triangles)).unwrap_or_else(|fault| panic!("{name}: {fault}"));
+    }
+}

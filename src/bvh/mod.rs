@@ -169,7 +169,16 @@ impl Bvh {
                 ([leaf], _) if leaf.contains(&boxes[primitive]) => {}
                 (_, None) => return Err(format!("primitive {primitive} does not lie in one leaf")),
                 (leaves, Some(triangles)) => {
-                    let inside = |point: Vec3| leaves.iter().any(|leaf| leaf.contains(&Aabb { lo: point, hi: point }));
+                    // The points themselves are rounded, a few units in the last place.
+                    let largest =
+                        triangles[primitive].iter().fold(0.0_f32, |all, corner| all.max(corner.abs().max_element()));
+                    let rounding = Vec3::splat(2.0 * f32::EPSILON * largest);
+                    let inside = |point: Vec3| {
+                        leaves.iter().any(|leaf| {
+                            Aabb { lo: leaf.lo - rounding, hi: leaf.hi + rounding }
+                                .contains(&Aabb { lo: point, hi: point })
+                        })
+                    };
                     if let Some(point) = points_of(&triangles[primitive]).find(|point| !inside(*point)) {
                         return Err(format!("{point} of primitive {primitive} lies in none of its leaves"));
                     }
