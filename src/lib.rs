@@ -22,20 +22,17 @@
 //! ```
 //! # Rooms, and who may know whom
 //! ```text
-//! main → cli, memory      cli → everything below       render → scene, bvh, vulkan, layout, film, report, error
+//! main → cli → everything below       render → scene, bvh, vulkan, layout, film, report, error
 //! stress, study → render, scene, film, report, error (stress also reference and layout, study bvh)
 //! reference → scene, film, error      scene → error, layout (features only)       bvh → layout, error
-//! vulkan → memory, error      film → error      layout, report, error, memory → nothing
+//! vulkan → error      film → error      layout, report, error → nothing
 //! ```
-//! All `unsafe` lives in [`vulkan`] and, for huge pages, in [`memory`]. What host and device share is declared once, in `shaders/shared/`,
-//! see [`layout`].
+//! All `unsafe` lives in [`vulkan`]. What host and device share is declared once, in `shaders/shared/`, see [`layout`].
 
 pub mod bvh;
 pub mod error;
 pub mod film;
 pub mod layout;
-#[allow(unsafe_code)]
-pub mod memory;
 pub mod reference;
 pub mod render;
 pub mod report;
@@ -49,3 +46,4 @@ pub use film::Film;
 pub use render::{render, Options, Renderer};
 pub use report::Report;
 pub use scene::Scene;
+pub use vulkan::HugePages;

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 
 #[global_allocator]
-static ALLOCATOR: glimt::memory::HugePages = glimt::memory::HugePages;
+static ALLOCATOR: glimt::HugePages = glimt::HugePages;
 
 fn main() -> ExitCode {
     let context =

@@ -21,6 +21,7 @@ pub(super) struct Frame<'a> {
     view: &'a View,
     plan: Plan,
     pub kernels: Kernels,
+    /// Traces again what overflowed or was uncertain.
     again: Again,
     /// Subtrees that tracing again walks through one by one: the whole tree, unless that is too much for one dispatch.
     parts: Vec<u32>,

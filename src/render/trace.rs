@@ -12,7 +12,7 @@ use crate::layout::{
     COUNTER_FILLING, FAR, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW, WORKGROUP,
 };
 use crate::scene::{Scene, View};
-use crate::vulkan::{Access, Buffer, Commands, Kernel};
+use crate::vulkan::{Access, Buffer, Commands, Kernel, Usage};
 use glam::{DVec3, Vec3};
 use std::sync::{Arc, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -253,11 +253,12 @@ impl Input {
             }
             None => Vec::new(),
         };
+        let source = |name, bytes: &[u8]| Buffer::with_data(&renderer.device, name, bytes, Usage::Storage);
         Ok(Self {
             slot: queue.map(|(slot, _)| slot),
-            items: upload::staging(renderer, bytemuck::cast_slice(&items))?,
-            counters: upload::staging(renderer, bytemuck::cast_slice(&counters))?,
-            ones: upload::staging(renderer, bytemuck::cast_slice(&vec![[1.0_f32; 4]; rays.len()]))?,
+            items: source("rays", bytemuck::cast_slice(&items))?,
+            counters: source("first counters", bytemuck::cast_slice(&counters))?,
+            ones: source("ones", bytemuck::cast_slice(&vec![[1.0_f32; 4]; rays.len()]))?,
         })
     }
 }

@@ -281,12 +281,6 @@ pub(super) fn frame_buffer(renderer: &Renderer, slot: u32, name: &'static str, b
     Buffer::new(&renderer.device, name, bytes, usage, Memory::Device)
 }
 
-/// Makes a buffer that the device copies from; never empty.
-pub(super) fn staging(renderer: &Renderer, bytes: &[u8]) -> Result<Buffer> {
-    let copy = |target: &mut [u8]| target.copy_from_slice(bytes);
-    Buffer::uploaded(&renderer.device, "staging", bytes.len() as u64, Usage::Storage, copy)
-}
-
 /// A copy of a whole buffer that the host can read.
 pub(super) fn read_back(renderer: &Renderer, buffer: &Buffer) -> Result<Buffer> {
     let copy = Buffer::new(&renderer.device, "read back", buffer.bytes, Usage::Storage, Memory::ReadBack)?;

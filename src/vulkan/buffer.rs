@@ -1,9 +1,9 @@
 //! Buffers: memory, optional texel view, upload and read-back.
 
 use super::device::lock;
+use super::huge_pages::prefer_huge_pages;
 use super::{failed, Access, Commands, Device, DeviceKind, Fetch};
 use crate::error::{Error, Result};
-use crate::memory::prefer_huge_pages;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::MemoryLocation;
@@ -118,32 +118,18 @@ impl Buffer {
         if bytes == 0 {
             return Self::new(device, name, 0, usage, Memory::Device);
         }
+        let (seen_as, seen_usage) = if device.staged { ("staging", Usage::Storage) } else { (name, usage) };
+        let mut seen = Self::new(device, seen_as, bytes, seen_usage, Memory::Upload)?;
+        fill(seen.mapped(bytes)?);
         if !device.staged {
-            return Self::uploaded(device, name, bytes, usage, fill);
+            return Ok(seen);
         }
-        let staging = Self::uploaded(device, "staging", bytes, Usage::Storage, fill)?;
         let buffer = Self::new(device, name, bytes, usage, Memory::Device)?;
         let mut commands = Commands::new(device, 0)?;
-        commands.copy(&staging, &buffer, 0, bytes);
+        commands.copy(&seen, &buffer, 0, bytes);
         // Buffer: the copy wrote, kernels of later submissions read.
         commands.barrier(Access::Transfer, Access::ShaderReadWrite);
         commands.submit_and_wait()?;
-        Ok(buffer)
-    }
-
-    /// Makes a buffer in memory that the host sees, filled like [`Buffer::filled`].
-    ///
-    /// # Errors
-    /// As [`Buffer::new`].
-    pub fn uploaded(
-        device: &Arc<Device>,
-        name: &'static str,
-        bytes: u64,
-        usage: Usage,
-        fill: impl FnOnce(&mut [u8]),
-    ) -> Result<Self> {
-        let mut buffer = Self::new(device, name, bytes, usage, Memory::Upload)?;
-        fill(buffer.mapped(bytes)?);
         Ok(buffer)
     }
 

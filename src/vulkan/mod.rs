@@ -7,7 +7,7 @@
 //!                    └─ Commands (record: label, bind, dispatch, barrier, timestamp → submit and wait)
 //! ```
 //! All `unsafe` of the project lives in this room: one block, one call, one reason. Every object holds an `Arc` of the device
-//! and is freed in `Drop`; the device holds the instance. Vulkan 1.2, no window system extension.
+//! and is freed in `Drop`; the device holds the instance. [`HugePages`] is for programs: memory that large scenes go through. Vulkan 1.2, no window system extension.
 
 #![allow(unsafe_code)]
 
@@ -16,6 +16,7 @@ mod buffer;
 mod cache;
 mod commands;
 mod device;
+mod huge_pages;
 mod instance;
 mod kernel;
 
@@ -24,6 +25,7 @@ pub use buffer::{Buffer, Memory, Usage};
 pub use cache::Cache;
 pub use commands::{Access, Commands};
 pub use device::{Device, DeviceChoice, DeviceInfo, DeviceKind, Fetch, Habits};
+pub use huge_pages::HugePages;
 pub use instance::Instance;
 pub use kernel::Kernel;
 
