@@ -6,6 +6,9 @@
 // sensible to divide by, and where rounding could move a hit from before the ray's start to behind it, or back, the ray would meet
 // the very thing that it leaves. Such rays are traced again with numbers of two floats each.
 
+#include "ray.glsl"
+#include "exact.glsl"
+
 /// What is left of the products of edge functions, as a share, below which barycentric coordinates have fewer than six bits.
 const float LITTLE_LEFT = 7.6e-6;
 /// Rounding error of the volume between a ray's start and a thin triangle, as a share of the products it is made of: of a million random
@@ -14,11 +17,6 @@ const float VOLUME_ERROR = 2.0e-7;
 
 /// The triangle of a ray that hits none.
 const uint NO_TRIANGLE = 0xffffffffu;
-
-struct Ray {
-    vec3 origin;
-    vec3 direction;
-};
 
 struct Hit {
     /// Distance along the ray, in lengths of its direction.
@@ -37,48 +35,6 @@ struct Hit {
     /// What is left of light that came through surfaces that are not opaque; for rays that any hit will do.
     vec3 passed;
 };
-
-/// A ray prepared for the triangle test. Axes are rotated so that z is the direction's largest component.
-struct ShearedRay {
-    vec3 origin;
-    /// x/z, y/z and 1/z of the rotated direction.
-    vec3 shear;
-    /// What rounding took from the first two; for rays that are traced again.
-    vec2 shear_rest;
-    uint largest_axis;
-};
-
-vec3 rotate_axes(vec3 v, uint largest_axis) {
-    return largest_axis == 0u ? v.yzx : largest_axis == 1u ? v.zxy : v;
-}
-
-/// What rounding took from a product: a·b = fl(a·b) + rest, exactly (Dekker, Numer. Math. 18, 1971). Not by fma, which
-/// software Vulkan does not fuse.
-float product_rest(float a, float b, float product) {
-    precise float scaled_a = a * 4097.0;
-    precise float scaled_b = b * 4097.0;
-    precise float high_a = scaled_a - (scaled_a - a);
-    precise float high_b = scaled_b - (scaled_b - b);
-    precise float low_a = a - high_a;
-    precise float low_b = b - high_b;
-    precise float rest = ((high_a * high_b - product) + high_a * low_b + low_a * high_b) + low_a * low_b;
-    return rest;
-}
-
-ShearedRay shear_ray(Ray ray) {
-    vec3 size = abs(ray.direction);
-    uint axis = size.x >= size.y ? (size.x >= size.z ? 0u : 2u) : (size.y >= size.z ? 1u : 2u);
-    vec3 d = rotate_axes(ray.direction, axis);
-    ShearedRay sheared = ShearedRay(ray.origin, vec3(d.x / d.z, d.y / d.z, 1.0 / d.z), vec2(0.0), axis);
-    if (RETRACE) {
-        precise vec2 back = sheared.shear.xy * d.z;
-        vec2 back_rest =
-            vec2(product_rest(sheared.shear.x, d.z, back.x), product_rest(sheared.shear.y, d.z, back.y));
-        precise vec2 rest = (d.xy - back) - back_rest;
-        sheared.shear_rest = rest * sheared.shear.z;
-    }
-    return sheared;
-}
 
 #ifndef PLAIN
 /// Barycentric coordinates and distance by Möller and Trumbore (JGT 2(1) 1997): u, v, w and t, all of one sign where the ray
@@ -106,43 +62,6 @@ float edge_function(vec2 p, vec2 q, inout float size) {
     precise float area = first - second;
     size += abs(first);
     return area;
-}
-
-/// A corner as the ray sees it, sheared: x and y of two floats each.
-struct ExactCorner {
-    vec2 at;
-    vec2 rest;
-};
-
-/// `corner` is fl(vertex - origin), rotated.
-ExactCorner shear_exactly(ShearedRay ray, uvec4 texel, vec3 corner) {
-    vec3 vertex = rotate_axes(uintBitsToFloat(texel.xyz), ray.largest_axis);
-    vec3 origin = rotate_axes(ray.origin, ray.largest_axis);
-    // What rounding took from the two subtractions (Knuth, TAOCP 2, 4.2.2).
-    precise vec3 moved = corner - vertex;
-    precise vec3 corner_rest = (vertex - (corner - moved)) - (origin + moved);
-    precise vec2 shift = ray.shear.xy * corner.z;
-    precise vec2 at = corner.xy - shift;
-    precise vec2 shifted = at - corner.xy;
-    precise vec2 at_rest = (corner.xy - (at - shifted)) - (shift + shifted);
-    vec2 shift_rest =
-        vec2(product_rest(ray.shear.x, corner.z, shift.x), product_rest(ray.shear.y, corner.z, shift.y));
-    precise vec2 low_products = ray.shear.xy * corner_rest.z + ray.shear_rest * corner.z;
-    precise vec2 rest = at_rest + (corner_rest.xy - (shift_rest + low_products));
-    return ExactCorner(at, rest);
-}
-
-/// Twice the area of the triangle from the origin to p and q, twice: as the rounded corners have it, which decides what is inside,
-/// since a neighbour that needs no more than f32 has the same corners; and as the corners have it with their rests.
-vec2 exact_edge_function(ExactCorner p, ExactCorner q) {
-    precise float first = p.at.x * q.at.y;
-    precise float second = p.at.y * q.at.x;
-    float lost = product_rest(p.at.x, q.at.y, first) - product_rest(p.at.y, q.at.x, second);
-    precise float rounded = (first - second) + lost;
-    precise float first_rest = p.at.x * q.rest.y + p.rest.x * q.at.y;
-    precise float second_rest = p.at.y * q.rest.x + p.rest.y * q.at.x;
-    precise float exact = rounded + (first_rest - second_rest);
-    return vec2(rounded, exact);
 }
 
 /// Less than this part of light is none.
