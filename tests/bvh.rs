@@ -164,15 +164,48 @@ fn hostile_triangles_keep_depth_and_memory_bounded() {
 }
 
 #[test]
-fn cut_triangles_do_not_depend_on_the_number_of_threads() {
+fn trees_over_triangles_do_not_depend_on_the_number_of_threads() {
     let triangles = hay(120_000);
-    let build = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Bvh::over_triangles(&triangles, Quality::Best))
-    };
-    let (one, three) = (build(1), build(3));
-    assert!(one.order == three.order && one.order.len() > triangles.len());
-    assert!(one.nodes.iter().zip(&three.nodes).all(|(a, b)| a.children == b.children && a.bounds == b.bounds));
+    for quality in [Quality::Fast, Quality::Best] {
+        let build = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| Bvh::over_triangles(&triangles, quality))
+        };
+        let (one, three) = (build(1), build(3));
+        assert!(one.order == three.order && (one.order.len() > triangles.len()) == (quality == Quality::Best));
+        assert!(one.nodes.iter().zip(&three.nodes).all(|(a, b)| a.children == b.children && a.bounds == b.bounds));
+    }
+}
+
+/// A grid's cells may hold nothing, a few or nearly all; the tree is valid and costs about what splits from the top down give.
+#[test]
+fn fast_trees_over_many_triangles_are_good_wherever_they_lie() {
+    let small = |at: Vec3| [at, at + Vec3::new(0.01, 0.0, 0.002), at + Vec3::new(0.0, 0.01, 0.003)];
+    let scattered = |count| hay(count).into_iter().map(|[a, ..]| a);
+    let even: Vec<_> = scattered(60_000).map(small).collect();
+    let mut stadium: Vec<_> = scattered(40_000).map(|at| small(at * 1e-3)).collect();
+    stadium.push(small(Vec3::splat(1e4)).map(|corner| corner * 2.0));
+    let shrinking: Vec<_> = scattered(40_000)
+        .zip(0..)
+        .map(|(at, i)| small(at).map(|corner| corner * (-((i % 40) as f32)).exp2()))
+        .collect();
+    let plane: Vec<_> = scattered(20_000).map(|at| small(at * Vec3::new(1.0, 0.0, 1.0))).collect();
+    let line: Vec<_> = scattered(20_000).map(|at| small(at * Vec3::X)).collect();
+    for (name, triangles) in [
+        ("even", even),
+        ("in a corner", stadium),
+        ("ever smaller", shrinking),
+        ("on a plane", plane),
+        ("on a line", line),
+        ("hay", hay(20_000)),
+    ] {
+        let boxes = boxes_of(&triangles);
+        let (fast, top_down) = (Bvh::over_triangles(&triangles, Quality::Fast), Bvh::over_boxes(&boxes, 6));
+        fast.validate(&boxes, None).unwrap_or_else(|fault| panic!("{name}: {fault}"));
+        let ratio = fast.stats().sah_cost / top_down.stats().sah_cost;
+        println!("{name}: depth {} and {}, SAH {ratio:.3}", fast.depth, top_down.depth);
+        assert!(ratio < 1.15, "{name}: {ratio}");
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@
 
 use super::references::{Box4, Reference, Summary};
 use super::reinsert::reinsert;
-use super::{object_split, spatial_split, Bvh, Child, Node, Wide};
+use super::{object_split, spatial_split, Bvh, Child, Node};
 use crate::layout::MAX_TREE_DEPTH;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -23,6 +23,8 @@ const EMPTY: f32 = 1.0;
 /// What kind of tree to build.
 #[derive(Clone, Copy)]
 pub(super) struct Recipe<'a> {
+    /// So few references are a leaf, whatever a split would cost.
+    pub smallest: usize,
     /// Most references in a leaf that a split could separate.
     pub leaf: usize,
     /// Corners, for spatial splits, with the share of the root's area that children must overlap before one is tried.
@@ -31,44 +33,44 @@ pub(super) struct Recipe<'a> {
     pub reinsert: bool,
 }
 
-struct Builder<'a> {
+/// Builds trees by a recipe.
+pub(super) struct Builder<'a> {
     recipe: Recipe<'a>,
     /// Half the area of the root.
     whole: f32,
 }
 
+/// What is built over some references.
+pub(super) struct Tree {
+    pub bounds: Box4,
+    pub root: Child,
+    /// In depth-first order; leaves are numbered by their places among the references.
+    pub nodes: Vec<Node>,
+}
+
 /// Builds over the first `count` references of `space`.
 pub(super) fn build(space: &mut [Reference], count: usize, recipe: Recipe) -> Bvh {
-    let builder = Builder { recipe, whole: Summary::of(&space[..count]).bounds.half_area() };
-    let Built { bounds, root, pieces } = builder.large(space, count, 0, 1);
-    let mut nodes = joined(&pieces);
-    drop(pieces);
-    if nodes.is_empty() {
-        // The root is always a node, so that traversal needs no special case for small scenes.
-        nodes.push(Node { bounds: [bounds.aabb(); 2], children: [root, Child::Leaf { first: 0, count: 0 }] });
-    } else if recipe.reinsert {
+    let builder = Builder::new(recipe, &Summary::of(&space[..count]).bounds);
+    let built = builder.large(space, count, 0, 1);
+    let (bounds, mut root) = (built.bounds, built.root);
+    let mut nodes = built.nodes();
+    if recipe.reinsert && !nodes.is_empty() {
         nodes = reinsert(&nodes);
     }
-    // Leaves were numbered by their place in the space; now the gaps between them are closed.
+    // Now the gaps between the leaves are closed.
     let mut order = Vec::with_capacity(count);
-    let mut depths = vec![1_u8; nodes.len()];
-    for (index, node) in nodes.iter_mut().enumerate() {
-        for child in &mut node.children {
-            match child {
-                Child::Leaf { first, count } => {
-                    let place = *first as usize;
-                    *first = order.len() as u32;
-                    order.extend(space[place..][..*count as usize].iter().map(Reference::primitive));
-                }
-                // A node comes before what is below it.
-                Child::Node(below) => depths[*below as usize] = depths[index] + 1,
-            }
+    let mut closed = |child: &mut Child| {
+        if let Child::Leaf { first, count } = child {
+            let place = *first as usize;
+            *first = order.len() as u32;
+            order.extend(space[place..][..*count as usize].iter().map(Reference::primitive));
         }
+    };
+    if nodes.is_empty() {
+        closed(&mut root);
     }
-    let depth = depths.into_iter().max().unwrap_or(0).into();
-    let mut bvh = Bvh { nodes, order, bounds: bounds.aabb(), depth, wide: Wide::default() };
-    bvh.wide = Wide::of(&bvh);
-    bvh
+    nodes.iter_mut().flat_map(|node| &mut node.children).for_each(closed);
+    Bvh::new(root, nodes, order, bounds.aabb())
 }
 
 /// A subtree, in pieces that were built side by side.
@@ -94,17 +96,19 @@ impl Built {
     fn behind(self, at: u32) -> impl Iterator<Item = Piece> {
         self.pieces.into_iter().map(move |piece| Piece { first: piece.first + at, ..piece })
     }
-}
 
-/// All nodes in one array.
-fn joined(pieces: &[Piece]) -> Vec<Node> {
-    let count = pieces.last().map_or(0, |last| last.first as usize + last.nodes.len());
-    let node = |index: usize| {
-        let piece = &pieces[pieces.partition_point(|piece| piece.first as usize <= index) - 1];
-        let node = &piece.nodes[index - piece.first as usize];
-        Node { children: node.children.map(|child| renumbered(child, piece.first)), ..*node }
-    };
-    (0..count).into_par_iter().map(node).collect()
+    /// All nodes in one array.
+    fn nodes(mut self) -> Vec<Node> {
+        if self.pieces.len() == 1 {
+            return self.pieces.swap_remove(0).nodes;
+        }
+        let node = |index: usize| {
+            let piece = &self.pieces[self.pieces.partition_point(|piece| piece.first as usize <= index) - 1];
+            let node = &piece.nodes[index - piece.first as usize];
+            Node { children: node.children.map(|child| renumbered(child, piece.first)), ..*node }
+        };
+        (0..self.node_count() as usize).into_par_iter().map(node).collect()
+    }
 }
 
 fn leaf(first: usize, count: usize) -> Child {
@@ -119,7 +123,18 @@ struct Halves {
     middle: usize,
 }
 
-impl Builder<'_> {
+impl<'a> Builder<'a> {
+    /// For a tree over references in these bounds.
+    pub fn new(recipe: Recipe<'a>, bounds: &Box4) -> Self {
+        Self { recipe, whole: bounds.half_area() }
+    }
+
+    /// Builds over references without free space; no node is at a level before `depth`.
+    pub fn tree(&self, references: &mut [Reference], depth: u32) -> Tree {
+        let built = self.large(references, references.len(), 0, depth);
+        Tree { bounds: built.bounds, root: built.root, nodes: built.nodes() }
+    }
+
     /// Builds the subtree over the first `count` references of `space`, whose place in the whole is `first`, in parallel.
     fn large(&self, space: &mut [Reference], count: usize, first: usize, depth: u32) -> Built {
         if count <= PARALLEL {
@@ -190,8 +205,8 @@ impl Builder<'_> {
     /// leaf.
     fn split(&self, space: &mut [Reference], count: usize, summary: &Summary, depth: u32) -> Option<(usize, usize)> {
         let Summary { bounds, centers, empty_area } = summary;
-        let leaf = self.recipe.leaf;
-        if count <= 1 {
+        let Recipe { smallest, leaf, .. } = self.recipe;
+        if count <= smallest {
             return None;
         }
         // Halving from here on would just fit: no more choice.

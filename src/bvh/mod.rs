@@ -5,6 +5,7 @@
 
 mod aabb;
 mod build;
+mod mini_trees;
 mod object_split;
 mod quantise;
 mod references;
@@ -27,6 +28,11 @@ use references::Reference;
 
 /// Larger leaves appear only where nothing separates their triangles; smaller ones wherever that is cheaper.
 const LEAF: usize = 6;
+/// So few triangles are a leaf unless the tree is to be the best: dividing them takes a quarter of a build and makes a third of all nodes, and rays are
+/// hardly faster.
+const SMALL_LEAF: usize = 4;
+/// So many triangles get a fast tree by way of mini trees.
+const MANY: usize = 8192;
 
 /// What a child is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +75,7 @@ pub struct Bvh {
 /// How much work goes into a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quality {
-    /// Object splits only.
+    /// Object splits only; over many triangles, above the trees of a grid's cells.
     Fast,
     /// Spatial splits where boxes overlap much, for up to 3 in 10 more references.
     Balanced,
@@ -97,13 +103,19 @@ impl Quality {
     }
 }
 
+impl Node {
+    /// Without primitives.
+    const NOTHING: Self = Self { bounds: [Aabb::EMPTY; 2], children: [Child::Leaf { first: 0, count: 0 }; 2] };
+}
+
 impl Bvh {
     /// Builds a tree over boxes with leaves of at most `leaf` where anything separates them, in parallel; the same boxes give
     /// the same tree on any number of threads.
     pub fn over_boxes(boxes: &[Aabb], leaf: usize) -> Self {
         let mut references: Vec<Reference> =
             (0..).zip(boxes).map(|(primitive, bounds)| Reference::new(bounds.lo, bounds.hi, primitive)).collect();
-        build::build(&mut references, boxes.len(), Recipe { leaf, spatial: None, reinsert: false })
+        let recipe = Recipe { smallest: 1, leaf, spatial: None, reinsert: false };
+        build::build(&mut references, boxes.len(), recipe)
     }
 
     /// Builds a tree over triangles, as [`Bvh::over_boxes`]; one that is long may lie in several leaves.
@@ -122,7 +134,35 @@ impl Bvh {
         // Only what may be cut is looked at again.
         let triangles: Vec<[Vec3; 3]> = (0..if free > 0 { count } else { 0 }).into_par_iter().map(&triangle).collect();
         let spatial = (free > 0).then_some((triangles.as_slice(), overlap));
-        build::build(&mut space, count, Recipe { leaf: LEAF, spatial, reinsert: quality == Quality::Best })
+        let is_best = quality == Quality::Best;
+        let smallest = if is_best { 1 } else { SMALL_LEAF };
+        let recipe = Recipe { smallest, leaf: LEAF, spatial, reinsert: is_best };
+        if quality == Quality::Fast && count >= MANY {
+            mini_trees::build(&space, recipe)
+        } else {
+            build::build(&mut space, count, recipe)
+        }
+    }
+
+    /// From nodes in depth-first order, the first of them the root if there are any.
+    fn new(root: Child, mut nodes: Vec<Node>, order: Vec<u32>, bounds: Aabb) -> Self {
+        if nodes.is_empty() {
+            // The root is always a node, so that traversal needs no special case for small scenes.
+            nodes.push(Node { bounds: [bounds; 2], children: [root, Node::NOTHING.children[1]] });
+        }
+        let mut depths = vec![1_u8; nodes.len()];
+        for (index, node) in nodes.iter().enumerate() {
+            for child in node.children {
+                if let Child::Node(below) = child {
+                    // A node comes before what is below it.
+                    depths[below as usize] = depths[index] + 1;
+                }
+            }
+        }
+        let depth = depths.into_iter().max().unwrap_or(0).into();
+        let mut bvh = Self { nodes, order, bounds, depth, wide: Wide::default() };
+        bvh.wide = Wide::of(&bvh);
+        bvh
     }
 
     /// Checks every invariant: each primitive wholly in one leaf, boxes that hold what is below them, leaf sizes, depth, order

@@ -2,10 +2,12 @@
 //! construction of SAH-based bounding volume hierarchies, RT 2007), or over every place between few sorted references.
 
 use super::references::{cells_per_unit, in_chunks, Box4, Reference};
-use glam::Vec4;
+use glam::{Mat4, Vec4};
 
 /// Most bins along an axis; fewer where there are few references.
 const BINS: usize = 32;
+/// A node with so few bins needs room for no more.
+const FEW_BINS: usize = 8;
 /// Up to this many references every place is tried.
 const SWEEP: usize = 12;
 
@@ -16,16 +18,19 @@ pub(super) struct ObjectSplit {
     pub cost: f32,
     /// Half area of what both sides cover.
     pub overlap: f32,
-    axis: usize,
     place: Place,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Place {
-    /// Those whose key is below this one go left.
-    Sorted(u64),
+    /// In this order so many go left.
+    Sorted { order: [u8; SWEEP], left: usize },
     /// Bins up to `last_left` go left.
-    Binned { binning: Binning, last_left: usize },
+    Binned { binning: Binning, axis: usize, last_left: usize },
+}
+
+fn bin_count(references: usize) -> usize {
+    (4 + references / 16).min(BINS)
 }
 
 /// Bin of a reference along each axis: (doubled centre − origin) · scale.
@@ -38,18 +43,20 @@ struct Binning {
 
 impl Binning {
     fn over(centers: &Box4, count: usize) -> Self {
-        let bins = (4 + count / 16).min(BINS);
+        let bins = bin_count(count);
         // The outer bins are half as wide as the others.
         let scale = cells_per_unit(bins - 1, centers.hi - centers.lo);
         Self { origin: centers.lo, scale, bins }
     }
 
-    fn bins_of(&self, reference: &Reference) -> [usize; 3] {
-        // Adding 2²³ rounds to a whole number and leaves it in the mantissa: cheaper than a checked conversion.
-        let place = (reference.doubled_center() - self.origin) * self.scale + Vec4::splat(8_388_608.0);
-        [place.x, place.y, place.z].map(|bin| ((bin.to_bits() & 0xff) as usize).min(self.bins - 1))
+    /// The bin along each axis, `FIRST_BIN` added.
+    fn place(&self, reference: &Reference) -> Vec4 {
+        (reference.doubled_center() - self.origin) * self.scale + Vec4::splat(FIRST_BIN)
     }
 }
+
+/// Adding 2²³ rounds to a whole number and leaves it in the mantissa: cheaper than a checked conversion.
+const FIRST_BIN: f32 = 8_388_608.0;
 
 #[derive(Clone, Copy)]
 struct Bin {
@@ -73,8 +80,10 @@ impl Bin {
 pub(super) fn cheapest(references: &[Reference], centers: &Box4) -> Option<ObjectSplit> {
     if references.len() <= SWEEP {
         sweep(references)
+    } else if bin_count(references.len()) <= FEW_BINS {
+        binned::<FEW_BINS>(references, centers)
     } else {
-        binned(references, centers)
+        binned::<BINS>(references, centers)
     }
 }
 
@@ -82,9 +91,17 @@ impl ObjectSplit {
     /// Moves what goes left to the front and returns how much that is; the order is a function of the references alone.
     pub fn partition(&self, references: &mut [Reference]) -> usize {
         match self.place {
-            Place::Sorted(first_right) => partition(references, |one| key(one, self.axis) < first_right),
-            Place::Binned { binning, last_left } => {
-                partition(references, |one| binning.bins_of(one)[self.axis] <= last_left)
+            Place::Sorted { order, left } => {
+                let mut before = [Reference::NONE; SWEEP];
+                before[..references.len()].copy_from_slice(references);
+                for (reference, from) in references.iter_mut().zip(order) {
+                    *reference = before[usize::from(from)];
+                }
+                left
+            }
+            Place::Binned { binning, axis, last_left } => {
+                let last = Vec4::splat(FIRST_BIN + last_left as f32);
+                partition(references, |one| binning.place(one).cmple(last).test(axis))
             }
         }
     }
@@ -114,67 +131,109 @@ fn partition(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool 
     left
 }
 
-/// What a reference is sorted by: its centre, then its primitive, as one number.
-fn key(reference: &Reference, axis: usize) -> u64 {
-    let bits = reference.doubled_center()[axis].to_bits();
-    // Floats in order as unsigned integers: negative ones turned round, below the others.
-    let ordered = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
-    u64::from(ordered) << 32 | u64::from(reference.primitive())
-}
-
+/// Every place along every axis, the axes side by side: lane k of a vector is what lies along axis k.
 fn sweep(references: &[Reference]) -> Option<ObjectSplit> {
     let count = references.len();
-    let mut best: Option<ObjectSplit> = None;
-    for axis in 0..3 {
-        let order = sorted(references, axis);
-        let bounds = |index: usize| references[order[index].1].bounds();
-        let mut right = [Box4::EMPTY; SWEEP];
-        let mut side = Box4::EMPTY;
-        for index in (1..count).rev() {
-            side = side.union(&bounds(index));
-            right[index] = side;
-        }
-        let mut left = Box4::EMPTY;
-        for (index, right) in right[..count].iter().enumerate().skip(1) {
-            left = left.union(&bounds(index - 1));
-            let cost = left.half_area() * index as f32 + right.half_area() * (count - index) as f32;
-            if best.is_none_or(|best| cost < best.cost) {
-                let overlap = left.intersection(right).half_area();
-                best = Some(ObjectSplit { cost, overlap, axis, place: Place::Sorted(order[index].0) });
-            }
-        }
+    let order = orders(references);
+    let mut boxes = [Boxes3::EMPTY; SWEEP];
+    for (place, of_axes) in boxes[..count].iter_mut().enumerate() {
+        *of_axes = Boxes3::of(order.map(|order| &references[usize::from(order[place])]));
     }
-    best
+    let mut right_costs = [Vec4::ZERO; SWEEP];
+    let mut right = Boxes3::EMPTY;
+    for place in (1..count).rev() {
+        right = right.union(&boxes[place]);
+        right_costs[place] = right.half_areas() * (count - place) as f32;
+    }
+    let mut left = Boxes3::EMPTY;
+    let (mut costs, mut places) = (Vec4::INFINITY, Vec4::ZERO);
+    for place in 1..count {
+        left = left.union(&boxes[place - 1]);
+        let cost = left.half_areas() * place as f32 + right_costs[place];
+        places = Vec4::select(cost.cmplt(costs), Vec4::splat(place as f32), places);
+        costs = costs.min(cost);
+    }
+    let axis = costs.truncate().min_position();
+    let place = places[axis] as usize;
+    let side = |order: &[u8]| {
+        order.iter().fold(Box4::EMPTY, |all, index| all.union(&references[usize::from(*index)].bounds()))
+    };
+    let (left, right) = order[axis][..count].split_at(place);
+    let overlap = side(left).intersection(&side(right)).half_area();
+    let place = Place::Sorted { order: order[axis], left: place };
+    (count > 1).then_some(ObjectSplit { cost: costs[axis], overlap, place })
 }
 
-/// Keys and places of at most SWEEP references, in the order of their keys. Each is put where as many are before it as have smaller keys:
+/// Three boxes, lane k the one along axis k.
+#[derive(Clone, Copy)]
+struct Boxes3 {
+    lo: [Vec4; 3],
+    hi: [Vec4; 3],
+}
+
+impl Boxes3 {
+    const EMPTY: Self = Self { lo: [Vec4::INFINITY; 3], hi: [Vec4::NEG_INFINITY; 3] };
+
+    fn of(references: [&Reference; 3]) -> Self {
+        let [a, b, c] = references.map(Reference::bounds);
+        let lanes = |a: Vec4, b: Vec4, c: Vec4| {
+            let turned = Mat4::from_cols(a, b, c, Vec4::ZERO).transpose();
+            [turned.x_axis, turned.y_axis, turned.z_axis]
+        };
+        Self { lo: lanes(a.lo, b.lo, c.lo), hi: lanes(a.hi, b.hi, c.hi) }
+    }
+
+    fn union(&self, other: &Self) -> Self {
+        let mut both = *self;
+        for axis in 0..3 {
+            both.lo[axis] = both.lo[axis].min(other.lo[axis]);
+            both.hi[axis] = both.hi[axis].max(other.hi[axis]);
+        }
+        both
+    }
+
+    fn half_areas(&self) -> Vec4 {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.hi[axis] - self.lo[axis]);
+        x * y + y * z + z * x
+    }
+}
+
+/// Places of at most SWEEP references in the order of their centres along each axis. Each is put where as many are before it as have smaller ones:
 /// more comparisons than sorting takes, but none that a processor would have to predict.
-fn sorted(references: &[Reference], axis: usize) -> [(u64, usize); SWEEP] {
-    let mut keys = [0; SWEEP];
-    let mut ranks = [0; SWEEP];
+fn orders(references: &[Reference]) -> [[u8; SWEEP]; 3] {
+    let mut keys = [Vec4::ZERO; SWEEP];
+    let mut ranks = [Vec4::ZERO; SWEEP];
     for (index, reference) in references.iter().enumerate() {
-        keys[index] = key(reference, axis);
+        keys[index] = reference.doubled_center();
+        let mut rank = Vec4::ZERO;
         for before in 0..index {
-            let is_after = usize::from(keys[before] <= keys[index]);
-            ranks[index] += is_after;
-            ranks[before] += 1 - is_after;
+            let is_after = Vec4::select(keys[before].cmple(keys[index]), Vec4::ONE, Vec4::ZERO);
+            rank += is_after;
+            ranks[before] += Vec4::ONE - is_after;
+        }
+        ranks[index] = rank;
+    }
+    let mut orders = [[0; SWEEP]; 3];
+    for (index, rank) in ranks[..references.len()].iter().enumerate() {
+        for (axis, order) in orders.iter_mut().enumerate() {
+            order[rank[axis] as usize] = index as u8;
         }
     }
-    let mut order = [(0, 0); SWEEP];
-    for index in 0..references.len() {
-        order[ranks[index]] = (keys[index], index);
-    }
-    order
+    orders
 }
 
-fn binned(references: &[Reference], centers: &Box4) -> Option<ObjectSplit> {
+/// With at most N bins along each axis.
+fn binned<const N: usize>(references: &[Reference], centers: &Box4) -> Option<ObjectSplit> {
     let binning = Binning::over(centers, references.len());
     let fill = |references: &[Reference]| {
-        let mut bins = [[Bin::EMPTY; BINS]; 3];
+        let mut bins = [[Bin::EMPTY; N]; 3];
         for reference in references {
             let one = Bin { bounds: reference.bounds(), count: 1 };
-            for (axis, bin) in binning.bins_of(reference).into_iter().enumerate() {
-                bins[axis][bin] = bins[axis][bin].union(&one);
+            let place = binning.place(reference);
+            for (bins, place) in bins.iter_mut().zip([place.x, place.y, place.z]) {
+                // It is below N anyway; so that nothing has to check.
+                let bin = &mut bins[place.to_bits() as usize % N];
+                *bin = bin.union(&one);
             }
         }
         bins
@@ -187,7 +246,7 @@ fn binned(references: &[Reference], centers: &Box4) -> Option<ObjectSplit> {
     });
     let mut best: Option<ObjectSplit> = None;
     for (axis, bins) in bins.iter().enumerate().filter(|(axis, _)| binning.scale[*axis] > 0.0) {
-        let mut right = [Bin::EMPTY; BINS];
+        let mut right = [Bin::EMPTY; N];
         for index in (1..binning.bins).rev() {
             right[index - 1] = right[index].union(&bins[index]);
         }
@@ -198,7 +257,7 @@ fn binned(references: &[Reference], centers: &Box4) -> Option<ObjectSplit> {
             let separates = left.count > 0 && right[index].count > 0;
             if separates && best.is_none_or(|best| cost < best.cost) {
                 let overlap = left.bounds.intersection(&right[index].bounds).half_area();
-                best = Some(ObjectSplit { cost, overlap, axis, place: Place::Binned { binning, last_left: index } });
+                best = Some(ObjectSplit { cost, overlap, place: Place::Binned { binning, axis, last_left: index } });
             }
         }
     }
@@ -235,23 +294,51 @@ mod tests {
     }
 
     #[test]
-    fn few_references_are_put_in_order() {
-        for count in 1..=SWEEP {
-            let references = points(count as u32);
-            let mut expected: Vec<(u64, usize)> = (0..count).map(|index| (key(&references[index], 2), index)).collect();
-            expected.sort_unstable();
-            assert_eq!(sorted(&references, 2)[..count], expected);
+    fn few_references_are_put_in_order_along_each_axis() {
+        let center = |i: u32, axis: u32| ((i * 7 + axis * 5) % 11) as f32 - 5.0;
+        for count in 1..=SWEEP as u32 {
+            let at = |i: u32| Vec3::new(center(i, 0), center(i, 1), center(i, 2));
+            let references: Vec<Reference> = (0..count).map(|i| Reference::new(at(i), at(i), i)).collect();
+            for (axis, order) in orders(&references).into_iter().enumerate() {
+                let mut expected: Vec<u8> = (0..count as u8).collect();
+                // Stable: equal ones stay as they were.
+                expected.sort_by(|a, b| {
+                    let [a, b] = [a, b].map(|place| references[usize::from(*place)].doubled_center()[axis]);
+                    a.total_cmp(&b)
+                });
+                assert_eq!(order[..count as usize], expected);
+            }
         }
     }
 
+    /// Of few references: the split that trying all of them one by one finds, and what goes left goes left.
     #[test]
-    fn keys_are_in_the_order_of_centres_then_of_primitives() {
-        let centers = [f32::MIN, -2.0, -1e-40, 0.0, 1e-40, 2.0, 3.0e38];
-        let keys: Vec<u64> = centers
-            .iter()
-            .flat_map(|center| [3, 8].map(|primitive| (Vec3::splat(center / 2.0), primitive)))
-            .map(|(center, primitive)| key(&Reference::new(center, center, primitive), 1))
-            .collect();
-        assert!(keys.is_sorted() && keys.windows(2).all(|two| two[0] != two[1]), "{keys:x?}");
+    fn few_references_are_split_where_it_is_cheapest() {
+        let hash = |i: u32| (i.wrapping_mul(2_654_435_761) >> 12) as f32 / 1_048_576.0;
+        for count in 2..=SWEEP {
+            let reference = |i: u32| {
+                let at = |salt: u32| Vec3::new(hash(9 * i + salt), hash(9 * i + salt + 1), hash(9 * i + salt + 2));
+                let lo = at(count as u32);
+                Reference::new(lo, lo + at(3) * 0.2, i)
+            };
+            let mut references: Vec<Reference> = (0..count as u32).map(reference).collect();
+            let side = |side: &[Reference]| {
+                let bounds = side.iter().fold(Box4::EMPTY, |all, one| all.union(&one.bounds()));
+                bounds.half_area() * side.len() as f32
+            };
+            let mut least = f32::INFINITY;
+            for axis in 0..3 {
+                let mut sorted = references.clone();
+                sorted.sort_by(|a, b| a.doubled_center()[axis].total_cmp(&b.doubled_center()[axis]));
+                least = (1..count).map(|left| side(&sorted[..left]) + side(&sorted[left..])).fold(least, f32::min);
+            }
+            let split = sweep(&references).unwrap();
+            let left = split.partition(&mut references);
+            let cost = side(&references[..left]) + side(&references[left..]);
+            assert!(
+                (cost / least - 1.0).abs() < 1e-5 && (split.cost / least - 1.0).abs() < 1e-5,
+                "{count}: {cost} {least}"
+            );
+        }
     }
 }

@@ -41,6 +41,12 @@ impl Box4 {
     }
 }
 
+impl From<Aabb> for Box4 {
+    fn from(bounds: Aabb) -> Self {
+        Self { lo: bounds.lo.extend(0.0), hi: bounds.hi.extend(0.0) }
+    }
+}
+
 /// Cells per unit of length along each axis; 0 where the axis has no extent.
 pub(super) fn cells_per_unit(cells: usize, size: Vec4) -> Vec4 {
     let scale = Vec4::splat(cells as f32) / size;
