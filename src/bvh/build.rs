@@ -180,7 +180,8 @@ impl<'a> Builder<'a> {
         };
         let (left, right) = space.split_at_mut(middle);
         let own = nodes.len();
-        nodes.push(Node { bounds: [bounds.aabb(); 2], children: [Child::Leaf { first: 0, count: 0 }; 2] });
+        // Its children are written once they are known.
+        nodes.push(Node::NOTHING);
         let left = self.subtree(left, left_count, first, depth + 1, nodes);
         let right = self.subtree(right, right_count, first + middle, depth + 1, nodes);
         nodes[own] = Node { bounds: [left.0.aabb(), right.0.aabb()], children: [left.1, right.1] };
