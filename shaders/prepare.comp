@@ -4,6 +4,7 @@
 /// One thread a queue: what was filled in becomes ready, counted, and turned into indirect dispatch arguments; filling starts
 /// anew.
 void main() {
+    begin();
     uint queue = gl_GlobalInvocationID.x;
     if (queue >= QUEUES)
         return;

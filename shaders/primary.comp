@@ -19,8 +19,9 @@ Ray camera_ray(vec2 point) {
     return Ray(frame.eye + parallel * offset, normalize(frame.forward + (1.0 - parallel) * offset));
 }
 
-/// One thread a pixel sample: camera ray → nearest hit → hit queue, or background.
+/// One thread a pixel sample: camera ray → nearest hit → hit queue, or background. What a hit's sample begins with, shade writes.
 void main() {
+    begin();
     uint thread = interleaved_thread();
     uint sample_index = RETRACE ? queue_item(thread, QUEUE_RETRACE) : thread;
     uint pixel = sample_index;
@@ -51,9 +52,8 @@ void main() {
     }
     if (!is_last_part(thread, hit))
         return;
-    bool is_hit = hit.triangle != NO_TRIANGLE;
-    // With LAYERS, shade says how much each of them covers.
-    radiance[sample_index] = is_hit ? vec4(0.0, 0.0, 0.0, LAYERS ? 0.0 : 1.0) : vec4(background(ray.direction), frame.background_alpha);
-    if (is_hit)
-        hit_queue[queue_append(QUEUE_HIT)] = HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, hit.instance);
+    if (hit.triangle != NO_TRIANGLE)
+        append_hit(HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, hit.instance));
+    else
+        radiance[sample_index] = vec4(background(ray.direction), frame.background_alpha);
 }

@@ -11,6 +11,7 @@
 
 /// One thread a ray that was reflected or goes on behind a surface: nearest hit → hit queue, or background.
 void main() {
+    begin();
     uint thread = interleaved_thread();
     uint index = queue_item(thread, QUEUE_REFLECTION);
     if (index == NO_ITEM)
@@ -28,8 +29,7 @@ void main() {
     if (hit.triangle != NO_TRIANGLE) {
         if (TEXTURES)
             throughput[item.sample_index].w = word_of(Way(way.travelled + hit.t, way.mirrors));
-        hit_queue[queue_append(QUEUE_HIT)] =
-            HitItem(item.sample_index, hit.triangle, hit.barycentrics, item.direction, hit.instance);
+        append_hit(HitItem(item.sample_index, hit.triangle, hit.barycentrics, item.direction, hit.instance));
     } else {
         add_radiance(item.sample_index, left.rgb * background(item.direction));
         if (LAYERS && way.mirrors == 0u)

@@ -8,6 +8,7 @@
 /// the waves, so that the sum is always the same; at the end it becomes the mean. Sums are compensated (Kahan, CACM 8(1) 1965): a million
 /// samples lose no more than one. Alpha and weights are whole numbers, which lose nothing.
 void main() {
+    begin();
     uint pixel = gl_GlobalInvocationID.x;
     // Rays that nobody has traced again: the host runs the wave once more.
     bool is_incomplete = ((counters[COUNTER_AGAIN] & ~step_now.again) | counters[COUNTER_LOST]) != 0u;

@@ -20,6 +20,7 @@ bool here(bool condition, HitItem item) {
 /// last one makes the ray that goes on, because that changes the throughput. A sample goes on one way only: where light passes a surface, that
 /// mirrors the background and nothing else.
 void main() {
+    begin();
     uint index = queue_item(interleaved_thread(), QUEUE_HIT);
     if (index == NO_ITEM)
         return;
@@ -53,9 +54,10 @@ void main() {
         vec3 own = material.ambient_tinted * surface.tint + material.emission;
         if (is_behind_seen && may_mirror)
             own += mirror * background(mirrored(item, surface));
-        add_radiance(item.sample_index, factor * alpha * own);
-        if (LAYERS && way.mirrors == 0u)
-            add_coverage(item.sample_index, alpha);
+        vec4 before = mix(FETCH_FLOATS(radiances, item.sample_index), vec4(0.0), bvec4(from_eye));
+        // Of what is still clear the share that the surface covers.
+        float covered = !LAYERS ? 1.0 : way.mirrors == 0u ? before.a + (1.0 - before.a) * alpha : before.a;
+        radiance[item.sample_index] = vec4(before.rgb + factor * alpha * own, covered);
     }
     if ((REFLECTIONS || LAYERS) && here(step_now.reflect != 0u, item)) {
         if (is_behind_seen)

@@ -9,6 +9,7 @@
 
 /// One thread a shadow ray: what it carries is added to its sample, as far as nothing blocks it.
 void main() {
+    begin();
     uint thread = interleaved_thread();
     uint index = queue_item(thread, QUEUE_SHADOW);
     if (index == NO_ITEM)

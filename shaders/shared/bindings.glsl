@@ -14,8 +14,9 @@
 // A texel as floats.
 #define FETCH_FLOATS(name, index) uintBitsToFloat(FETCH(name, index))
 #define STORAGE_BUFFER(slot, type, name) layout(set = 0, binding = slot, scalar) buffer name##_block { type name[]; };
-#define UNIFORM_BUFFER(slot, type, name) layout(set = 0, binding = slot, scalar) uniform name##_block { type name; };
-#define PUSH_CONSTANTS(type, name) layout(push_constant, scalar) uniform name##_block { type name; };
+// What all threads share is a variable that `begin` (kernel.glsl) reads.
+#define UNIFORM_BUFFER(slot, type, name) layout(set = 0, binding = slot, scalar) uniform name##_block { type name##_shared; }; type name;
+#define PUSH_CONSTANTS(type, name) layout(push_constant, scalar) uniform name##_block { type name##_shared; }; type name;
 
 /// Tree: NODE_TEXELS a node, one child record each: six u16 (lo.xyz, hi.xyz) on the grid, then the child's reference.
 FETCH_BUFFER(0, nodes)
@@ -36,16 +37,16 @@ FETCH_BUFFER(6, textures)
 FETCH_BUFFER(7, pixels)
 /// Camera, picture, background, grid.
 UNIFORM_BUFFER(8, Frame, frame)
-/// Hits to shade.
-STORAGE_BUFFER(9, HitItem, hit_queue)
+/// Hits to shade: a HitItem in ITEM_TEXELS.
+STORAGE_BUFFER(9, uvec4, hit_queue)
 /// The same, to be read.
 FETCH_VIEW(10, hit_items, hit_queue)
-/// Shadow rays to trace.
-STORAGE_BUFFER(11, RayItem, shadow_queue)
+/// Shadow rays to trace: a RayItem in ITEM_TEXELS.
+STORAGE_BUFFER(11, uvec4, shadow_queue)
 /// The same, to be read.
 FETCH_VIEW(12, shadow_items, shadow_queue)
-/// Reflected rays to trace.
-STORAGE_BUFFER(13, RayItem, reflection_queue)
+/// Reflected rays to trace, likewise.
+STORAGE_BUFFER(13, uvec4, reflection_queue)
 /// The same, to be read.
 FETCH_VIEW(14, reflection_items, reflection_queue)
 /// Rays to trace again: pixel samples, or places in the queue that they came from.

@@ -25,3 +25,10 @@
 #endif
 #include "bindings.glsl"
 layout(local_size_x = WORKGROUP) in;
+
+/// What every kernel does first: reads what all threads share. As long as nothing has branched, Mesa's software Vulkan reads such a word once; from
+/// the first branch on once a thread, twenty instructions instead of two.
+void begin() {
+    frame = frame_shared;
+    step_now = step_now_shared;
+}

@@ -17,8 +17,7 @@ void queue_shadow_ray(HitItem item, vec3 factor, Surface surface, Material mater
         return;
     vec3 origin = leave_towards_light(surface);
     shadow_radiance[item.sample_index].rgb = added;
-    shadow_queue[queue_append(QUEUE_SHADOW)] =
-        RayItem(origin, item.sample_index, light_sample.direction, light_sample.distance);
+    append_shadow_ray(RayItem(origin, item.sample_index, light_sample.direction, light_sample.distance));
 }
 
 /// The mirror's direction: r = 2(n·v)n − v, with v against the ray. Where a bent normal sends it into the surface, it is mirrored out again.
@@ -36,16 +35,14 @@ void queue_reflection_ray(HitItem item, vec3 factor, Way way, Surface surface, v
         return;
     vec3 direction = mirrored(item, surface);
     throughput[item.sample_index] = vec4(factor, word_of(Way(way.travelled, way.mirrors + 1u)));
-    reflection_queue[queue_append(QUEUE_REFLECTION)] =
-        RayItem(leave_surface(surface, direction), item.sample_index, direction, FAR);
+    append_reflection_ray(RayItem(leave_surface(surface, direction), item.sample_index, direction, FAR));
 }
 
 /// What lies behind a surface that is not opaque.
 void queue_ray_behind(HitItem item, vec3 factor, Way way, Surface surface) {
     if (step_now.round - way.mirrors < MAX_LAYERS) {
         throughput[item.sample_index] = vec4(factor, word_of(way));
-        reflection_queue[queue_append(QUEUE_REFLECTION)] =
-            RayItem(leave_surface(surface, item.direction), item.sample_index, item.direction, FAR);
+        append_reflection_ray(RayItem(leave_surface(surface, item.direction), item.sample_index, item.direction, FAR));
     } else {
         add_radiance(item.sample_index, factor * background(item.direction));
     }

@@ -7,15 +7,36 @@
 uint queue_append(uint queue) {
     uvec4 lanes = subgroupBallot(true);
     uint first = 0u;
-    if (subgroupElect())
+    if (gl_SubgroupInvocationID == subgroupBallotFindLSB(lanes))
         first = atomicAdd(counters[COUNTER_FILLING + queue], subgroupBallotBitCount(lanes));
     return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(lanes);
 }
 
-/// Leaves a ray of this pass, with its place in the queue that it came from, to be traced again.
+// Items are written as whole texels: of a struct, software Vulkan writes member by member, each in a loop over the threads.
+
+void append_hit(HitItem item) {
+    uint texel = queue_append(QUEUE_HIT) * ITEM_TEXELS;
+    hit_queue[texel] = uvec4(item.sample_index, item.triangle, floatBitsToUint(item.barycentrics));
+    hit_queue[texel + 1u] = uvec4(floatBitsToUint(item.direction), item.instance);
+}
+
+void append_shadow_ray(RayItem item) {
+    uint texel = queue_append(QUEUE_SHADOW) * ITEM_TEXELS;
+    shadow_queue[texel] = uvec4(floatBitsToUint(item.origin), item.sample_index);
+    shadow_queue[texel + 1u] = floatBitsToUint(vec4(item.direction, item.distance));
+}
+
+void append_reflection_ray(RayItem item) {
+    uint texel = queue_append(QUEUE_REFLECTION) * ITEM_TEXELS;
+    reflection_queue[texel] = uvec4(floatBitsToUint(item.origin), item.sample_index);
+    reflection_queue[texel + 1u] = floatBitsToUint(vec4(item.direction, item.distance));
+}
+
+/// Leaves a ray of this pass, with its place in the queue that it came from, to be traced again. So few are that each takes its own place: to take
+/// one for all of a subgroup costs instructions where no ray is left, too.
 void trace_again(uint place, uint pass) {
     atomicOr(counters[COUNTER_AGAIN], pass);
-    retrace_queue[queue_append(QUEUE_RETRACE)] = place;
+    retrace_queue[atomicAdd(counters[COUNTER_FILLING + QUEUE_RETRACE], 1u)] = place;
 }
 
 /// Workgroups that stay neighbours when the grid is interleaved: no divisor or multiple of the tiles in a row of common widths.
