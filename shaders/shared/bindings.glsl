@@ -18,7 +18,7 @@
 #define UNIFORM_BUFFER(slot, type, name) layout(set = 0, binding = slot, scalar) uniform name##_block { type name##_shared; }; type name;
 #define PUSH_CONSTANTS(type, name) layout(push_constant, scalar) uniform name##_block { type name##_shared; }; type name;
 
-/// Tree: NODE_TEXELS a node, one child record each: six u16 (lo.xyz, hi.xyz) on the grid, then the child's reference.
+/// Tree: NODE_TEXELS a node, one child record each: its box along each axis on the grid (src/bvh/quantise.rs), then the child's reference.
 FETCH_BUFFER(0, nodes)
 /// Triangles in leaf order: three positions as float bits; w = primitive, material, TRIANGLE_ flags.
 FETCH_BUFFER(1, triangles)

@@ -64,6 +64,12 @@ float edge_function(vec2 p, vec2 q, inout float size) {
     return area;
 }
 
+/// Whether none is negative or none positive. By comparisons: the smaller of two floats takes software Vulkan three instructions, for the sake of
+/// NaN.
+bool have_one_sign(float u, float v, float w) {
+    return all(greaterThanEqual(vec3(u, v, w), vec3(0.0))) || all(lessThanEqual(vec3(u, v, w), vec3(0.0)));
+}
+
 /// Less than this part of light is none.
 const float NO_LIGHT = 1.0 / 4096.0;
 
@@ -94,11 +100,13 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance
     float u = edge_function(pc, pb, size);
     float v = edge_function(pa, pc, size);
     float w = edge_function(pb, pa, size);
-    bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
+    bool inside = have_one_sign(u, v, w);
     float det = u + v + w;
     precise float volume = u * a.z + v * b.z + w * c.z;
     bool is_thin = THIN_TRIANGLES && (texel_c.w & PRECEDENCE_THIN) != 0u;
-    float reach = max(abs(a.z), max(abs(b.z), abs(c.z)));
+    // As integers, which not negative floats are ordered like.
+    ivec3 depths = floatBitsToInt(abs(vec3(a.z, b.z, c.z)));
+    float reach = intBitsToFloat(max(depths.x, max(depths.y, depths.z)));
     bool is_uncertain =
         inside && (abs(det) <= size * LITTLE_LEFT || (is_thin && abs(volume) <= size * reach * VOLUME_ERROR));
     if (RETRACE && is_uncertain) {
@@ -110,8 +118,7 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance
         vec2 both_w = exact_edge_function(exact_b, exact_a);
         vec2 both = both_u + both_v + both_w;
         // Nothing that is left of a triangle when corners are rounded covers nothing.
-        inside = both.x != 0.0 && (min(both_u.x, min(both_v.x, both_w.x)) >= 0.0 ||
-                                   max(both_u.x, max(both_v.x, both_w.x)) <= 0.0);
+        inside = both.x != 0.0 && have_one_sign(both_u.x, both_v.x, both_w.x);
         det = both.y;
         volume = both_u.y * a.z + both_v.y * b.z + both_w.y * c.z;
         // Beside the triangle, by less than corners are rounded, means its edge.

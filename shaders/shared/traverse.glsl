@@ -16,31 +16,38 @@ const int REGISTERS = int(STACK_REGISTERS);
 /// A node that no tree has. Every loop here also ends at it, see is_complete.
 const int IMPOSSIBLE = 0x7fffffff;
 
-/// The ray in grid coordinates, where a child's u16 box is compared without decoding it.
+/// The ray as a child's record needs it: see src/bvh/quantise.rs.
 struct GridRay {
+    /// In 65536ths of a quantum, from the middle of the grid.
     vec3 origin;
+    /// Along the ray, for such a part.
     vec3 inverse;
+    /// Along the ray, for half a quantum; not negative.
+    vec3 half_inverse;
 };
 
 GridRay grid_ray(Ray ray, vec3 grid_origin, vec3 grid_scale) {
     // A zero component would make 0 · ∞ = NaN and drop a box; 1e-20 stays finite on any grid.
     vec3 direction = mix(ray.direction, vec3(1e-20), lessThan(abs(ray.direction), vec3(1e-20)));
-    return GridRay((ray.origin - grid_origin) * grid_scale, 1.0 / (direction * grid_scale));
+    vec3 inverse = 1.0 / (direction * grid_scale);
+    return GridRay(((ray.origin - grid_origin) * grid_scale - 32768.0) * 65536.0, inverse / 65536.0, 0.5 * abs(inverse));
 }
 
 /// In place of the distance at which a ray enters a box: it does not.
 const int MISSED = 0x7fffffff;
 
-/// Slab test against a child's box: the distance at which the ray enters it, or MISSED. Distances are compared as integers,
-/// which orders them like floats because they are ≥ 0.
+/// Slab test against a child's box: the distance at which the ray enters it, something negative if it starts inside, or MISSED. An axis
+/// is a word, its upper half the middle of the box, with the lower half as a fraction, and its lower half how far the box reaches to either
+/// side: two conversions and no minimum or maximum.
+///
+/// Distances are compared as integers, which orders them like floats where they are ≥ 0. Negative ones come in the wrong order,
+/// but before all others: the largest is then at least the box's own entry, so that a box behind the ray is still missed.
 int entry_of(GridRay ray, uvec4 child, float t_max) {
-    vec3 lo = vec3(child.x & 0xffffu, child.x >> 16u, child.y & 0xffffu);
-    vec3 hi = vec3(child.y >> 16u, child.z & 0xffffu, child.z >> 16u);
-    ivec3 t_lo = floatBitsToInt((lo - ray.origin) * ray.inverse);
-    ivec3 t_hi = floatBitsToInt((hi - ray.origin) * ray.inverse);
-    ivec3 near = min(t_lo, t_hi);
-    ivec3 far = max(t_lo, t_hi);
-    int first = max(max(near.x, near.y), max(near.z, 0));
+    vec3 middle = (vec3(ivec3(child.xyz)) - ray.origin) * ray.inverse;
+    vec3 reach = vec3(child.xyz & 0xffffu) * ray.half_inverse;
+    ivec3 near = floatBitsToInt(middle - reach);
+    ivec3 far = floatBitsToInt(middle + reach);
+    int first = max(near.x, max(near.y, near.z));
     int last = min(min(far.x, far.y), min(far.z, floatBitsToInt(t_max)));
     return first > last ? MISSED : first;
 }
