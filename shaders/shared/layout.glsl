@@ -14,6 +14,12 @@ const uint STACK_REGISTERS = 14u;
 const uint MAX_LEAF_TRIANGLES = 14u;
 /// In place of a leaf's number of triangles: it is an instance.
 const uint LEAF_IS_INSTANCE = 15u;
+/// Quanta from the grid's edge to its middle: the boxes of the tree lie on a grid.
+const float GRID_MIDDLE = 131072.0;
+/// Parts of a quantum that middles of boxes are counted in.
+const float GRID_PARTS = 16384.0;
+/// Quanta that a box whose reach is 1 reaches to either side.
+const float GRID_REACH = 65536.0;
 /// Texels (16 bytes) in one tree node: a record for each of its children.
 const uint NODE_TEXELS = 4u;
 /// Texels in one triangle of the traversal, and in one triangle's normals, colours, texture coordinates or tangents.

@@ -18,33 +18,34 @@ const int IMPOSSIBLE = 0x7fffffff;
 
 /// The ray as a child's record needs it: see src/bvh/quantise.rs.
 struct GridRay {
-    /// In 65536ths of a quantum, from the middle of the grid.
+    /// In parts of a quantum, from the middle of the grid.
     vec3 origin;
     /// Along the ray, for such a part.
     vec3 inverse;
-    /// Along the ray, for half a quantum; not negative.
-    vec3 half_inverse;
+    /// Along the ray, for the unit that boxes reach to either side in; not negative.
+    vec3 reach_inverse;
 };
 
 GridRay grid_ray(Ray ray, vec3 grid_origin, vec3 grid_scale) {
     // A zero component would make 0 · ∞ = NaN and drop a box; 1e-20 stays finite on any grid.
     vec3 direction = mix(ray.direction, vec3(1e-20), lessThan(abs(ray.direction), vec3(1e-20)));
     vec3 inverse = 1.0 / (direction * grid_scale);
-    return GridRay(((ray.origin - grid_origin) * grid_scale - 32768.0) * 65536.0, inverse / 65536.0, 0.5 * abs(inverse));
+    return GridRay(((ray.origin - grid_origin) * grid_scale - GRID_MIDDLE) * GRID_PARTS, inverse / GRID_PARTS,
+                   abs(inverse) * GRID_REACH);
 }
 
 /// In place of the distance at which a ray enters a box: it does not.
 const int MISSED = 0x7fffffff;
 
 /// Slab test against a child's box: the distance at which the ray enters it, something negative if it starts inside, or MISSED. An axis
-/// is a word, its upper half the middle of the box, with the lower half as a fraction, and its lower half how far the box reaches to either
-/// side: two conversions and no minimum or maximum.
+/// is a word: as an integer the middle of the box, its last bits a small float that says how far the box reaches to either side. Neither needs more
+/// than one conversion, and which plane is the near one needs no comparison.
 ///
 /// Distances are compared as integers, which orders them like floats where they are ≥ 0. Negative ones come in the wrong order,
 /// but before all others: the largest is then at least the box's own entry, so that a box behind the ray is still missed.
 int entry_of(GridRay ray, uvec4 child, float t_max) {
     vec3 middle = (vec3(ivec3(child.xyz)) - ray.origin) * ray.inverse;
-    vec3 reach = vec3(child.xyz & 0xffffu) * ray.half_inverse;
+    vec3 reach = uintBitsToFloat((child.xyz << 14u & 0x0fffc000u) | 0x30000000u) * ray.reach_inverse;
     ivec3 near = floatBitsToInt(middle - reach);
     ivec3 far = floatBitsToInt(middle + reach);
     int first = max(near.x, max(near.y, near.z));

@@ -1,26 +1,31 @@
-//! The tree as the kernels walk it: one 16-byte record a child, boxes on a grid of 65 536 quanta an axis over the whole scene.
+//! The tree as the kernels walk it: one 16-byte record a child, boxes on a grid of some 2¹⁸ quanta an axis over the whole scene.
 //!
 //! A record: `x`, `y`, `z`, the box along each axis, and `w`, the child: an inner node's index, or `!(first << 4 | count)` for a
-//! leaf. An axis is `(middle − 32768) << 16 | reach`: as a signed integer it is the box's middle in 65536ths of a quantum, with
-//! its own lower half for a fraction, and its lower half is how many half quanta the box reaches to either side. The kernels
-//! convert both to floats as they are: nothing is shifted, and a box's near and far planes need no comparison.
-//! Example: from 2 to 6 quanta, reach 5 for the rounding: `(4 − 32768) << 16 | 5` is `0x80040005`, which is 4.00008 ± 2.5.
+//! leaf. An axis is `(middle − 2¹⁷) << 14 | reach`. As a signed integer it is the box's middle in 16384ths of a quantum, the reach being
+//! a known fraction; the reach is a small float without a sign, five bits of exponent and nine of mantissa, how far the box goes to either side:
+//! `2^(reach >> 9) · (1 + (reach & 511) / 512)` in 2⁻¹⁵ quanta. Small boxes thus grow by about a quantum and large ones by 1 in
+//! 1024; a kernel converts one number and shifts the other, and needs no comparison to tell a box's near plane from its far one.
+//! Example: `0x8000e080` reaches 2¹⁶ · (1 + 128 / 512) · 2⁻¹⁵ = 2.5 quanta to either side of 3 + 0x2080 / 16384 = 3.5078: the best there is for
+//! 2 to 6.
 //!
 //! Boxes are rounded outward, by more than the slab test's own error: about 4e-7 of the distance to the origin of the ray in
 //! quanta, so the further away a camera stands, the wider.
 
 use super::{Aabb, Bvh, Child, WideChild};
+use crate::layout::{GRID_MIDDLE, GRID_PARTS};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Largest coordinate.
-const LAST: f64 = 65535.0;
+/// Largest coordinate: a box from 0 to here is one that the largest reach holds.
+const LAST: f64 = 261_882.0;
 /// Slab error in quanta, for each quantum between ray origin and box: five roundings of 2⁻²⁴ and a reciprocal, doubled.
 const SLAB_ERROR: f64 = 9e-7;
-/// Parts of a quantum in which middles are counted.
-const PARTS: f64 = 65536.0;
-/// The middle of the grid, where middles are 0.
-const MIDDLE: i32 = 32768;
+/// Bits of a reach's mantissa.
+const MANTISSA: u32 = 9;
+/// Largest code of a reach.
+const LAST_REACH: u32 = (1 << 14) - 1;
+/// The reach with code 0, quanta.
+const LEAST_REACH: f64 = 1.0 / 32768.0;
 
 /// The grid: coordinate = (position − origin) · scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,18 +48,34 @@ pub struct Quantised {
 /// In place of a child that is not there: a leaf without triangles, in the corner of the grid where nothing is.
 const NO_CHILD: [u32; 4] = [1 << 31, 1 << 31, 1 << 31, !0];
 
-/// The word of an axis along which a box lies between two coordinates: the smallest that holds it, or without `outward` the nearest.
+/// How far a box with this code of a reach goes to either side, quanta.
+fn reach(code: u32) -> f64 {
+    let mantissa = f64::from(code & ((1 << MANTISSA) - 1)) / f64::from(1 << MANTISSA);
+    LEAST_REACH * f64::from(code >> MANTISSA).exp2() * (1.0 + mantissa)
+}
+
+/// The code of the least reach that is not below this one, or without `outward` of one beside it.
+fn code_of(reach: f64, outward: bool) -> u32 {
+    let cut = f64::MANTISSA_DIGITS - 1 - MANTISSA;
+    let bits = (reach / LEAST_REACH).max(1.0).to_bits();
+    let rounded = (bits + if outward { (1 << cut) - 1 } else { 1 << (cut - 1) }) >> cut;
+    (rounded - (1.0_f64.to_bits() >> cut)).min(LAST_REACH.into()) as u32
+}
+
+/// The word of an axis along which a box lies between two coordinates: one that holds it, or without `outward` one near it.
 fn axis(lower: f64, upper: f64, outward: bool) -> u32 {
     let (lower, upper) = (lower.clamp(0.0, LAST), upper.clamp(0.0, LAST));
-    let width = upper - lower;
-    let mut reach = if outward { width.ceil() } else { width.round() };
+    let (middle, half) = (0.5 * (lower + upper), 0.5 * (upper - lower));
+    let mut code = code_of(half, outward);
     loop {
-        let middle = (0.5 * (lower + upper) - reach / PARTS).round().clamp(0.0, LAST);
-        let off = (middle + reach / PARTS - 0.5 * (lower + upper)).abs();
-        if !outward || reach >= LAST || reach >= width + 2.0 * off {
-            return ((middle as i32 - MIDDLE) << 16) as u32 | reach.min(LAST) as u32;
+        let fraction = f64::from(code) / f64::from(GRID_PARTS);
+        let whole = (middle - fraction).round().clamp(0.0, LAST);
+        let needed = half + (whole + fraction - middle).abs();
+        if !outward || code == LAST_REACH || reach(code) >= needed {
+            return ((whole as i32 - GRID_MIDDLE as i32) << 14) as u32 | code;
         }
-        reach += 1.0;
+        // The fraction is the code's own: the next ones differ by little.
+        code = code_of(needed, true).max(code + 1);
     }
 }
 
@@ -109,35 +130,35 @@ pub fn quantise(bvh: &Bvh, reach: Vec3, outward: bool, refer: impl Fn(Child) -> 
 mod tests {
     use super::super::{Side, Wide, WIDTH};
     use super::*;
+    use crate::layout::GRID_REACH;
 
-    /// Where an axis' word says that a box begins and ends, in quanta.
+    /// Where an axis' word says that a box begins and ends, quanta; what the kernels do.
     fn ends(word: u32) -> (f64, f64) {
-        let middle = f64::from(word as i32) / PARTS + f64::from(MIDDLE);
-        let reach = 0.5 * f64::from(word & 0xffff);
+        let middle = f64::from(word as i32) / f64::from(GRID_PARTS) + f64::from(GRID_MIDDLE);
+        let reach = f64::from(GRID_REACH) * f64::from(f32::from_bits((word << 14 & 0x0fff_c000) | 0x3000_0000));
         (middle - reach, middle + reach)
     }
 
     #[test]
     fn axes_hold_their_boxes_and_little_more() {
-        assert_eq!(axis(2.0, 6.0, true), 0x8004_0005);
-        assert_eq!(axis(2.0, 6.0, false), 0x8004_0004);
+        assert_eq!(axis(2.0, 6.0, true), 0x8000_e080);
+        assert_eq!(ends(0x8000_e080), (3.507_812_5 - 2.5, 3.507_812_5 + 2.5));
         let random = |index: u32| f64::from(index.wrapping_mul(2_654_435_769) >> 8) / f64::from(1 << 24);
-        let mut spare = 0.0;
-        for index in 0..10_000 {
+        for index in 0..100_000 {
             let width = LAST * random(3 * index).powi(8);
             let lower = (LAST - width) * random(3 * index + 1);
-            let (begin, end) = ends(axis(lower, lower + width, true));
-            let most = if end - begin < LAST { 2.1 } else { 2.0 * LAST };
-            assert!(
-                begin <= lower && lower + width <= end && end - begin <= width + most,
-                "{lower} + {width}: {begin} {end}"
-            );
-            spare += end - begin - width;
+            let word = axis(lower, lower + width, true);
+            let (begin, end) = ends(word);
+            assert!(begin <= lower && lower + width <= end, "{lower} + {width}: {begin} {end}");
+            // The middle is off by half a quantum at most, and reaches are rounded by one part in 512.
+            assert!(end - begin <= 1.002 * (width + 1.01) + 0.01, "{lower} + {width}: {begin} {end}");
+            assert!(reach(word & LAST_REACH) * 2.0 == end - begin, "{word:x}");
         }
-        // As much as if both ends were rounded outward: half a quantum each.
-        assert!((spare / 10_000.0 - 1.0).abs() < 0.05, "{spare}");
-        assert_eq!(ends(axis(-1e9, 1e9, true)), (0.499_984_741_210_937_5, 65_535.499_984_741_21));
-        assert_eq!(NO_CHILD[..3].iter().map(|word| ends(*word)).collect::<Vec<_>>(), [(0.0, 0.0); 3]);
+        assert!(reach(LAST_REACH) >= 0.5 * LAST + 1.0);
+        // What is clamped, and what is not there.
+        let (begin, end) = ends(axis(-1e9, 1e9, true));
+        assert!(begin <= 0.0 && end >= LAST, "{begin} {end}");
+        assert!(ends(NO_CHILD[0]).1 < 0.001);
     }
 
     #[test]
