@@ -83,7 +83,7 @@ bool is_met(uint primitive, uint word, vec2 barycentrics, bool any, inout Hit hi
 }
 
 /// Takes the triangle, whose texels begin at `first`, as the new hit if it is nearer than the old one. Where `any` hit will do,
-/// backs count too. A ray for which that cannot be decided is `uncertain`.
+/// backs count too, and of the hit only the triangle is kept. A ray for which that cannot be decided is `uncertain`.
 bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance, bool any, inout Hit hit,
                         inout bool uncertain) {
     uvec4 texel_a = FETCH(triangles, first);
@@ -151,12 +151,15 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance
     bool comes_first = INSTANCES && instance != hit.instance ? instance < hit.instance : texel_a.w < hit.primitive;
     uint precedence = texel_c.w | (is_back ? PRECEDENCE_BACK : 0u);
     bool is_first = precedence != hit.precedence ? precedence < hit.precedence : comes_first;
-    bool nearer = t < hit.t || (t == hit.t && is_first);
+    bool nearer = any ? t <= hit.t : t < hit.t || (t == hit.t && is_first);
     if (inside && det != 0.0 && t > 0.0 && nearer && !culled) {
         vec2 barycentrics = vec2(v, w) / det;
         if (ALPHA && (texel_b.w & TRIANGLE_SEE_THROUGH) != 0u && !is_met(texel_a.w, texel_b.w, barycentrics, any, hit))
             return false;
-        hit = Hit(t, triangle, texel_a.w, barycentrics, instance, precedence, hit.passed);
+        if (any)
+            hit.triangle = triangle;
+        else
+            hit = Hit(t, triangle, texel_a.w, barycentrics, instance, precedence, hit.passed);
         return true;
     }
     return false;
