@@ -16,7 +16,7 @@ void queue_shadow_ray(HitItem item, vec3 factor, Surface surface, Material mater
     if (max(added.r, max(added.g, added.b)) <= 0.0)
         return;
     vec3 origin = leave_towards_light(surface);
-    shadow_radiance[item.sample_index].rgb = added;
+    shadow_radiance[item.sample_index] = vec4(added, 0.0);
     append_shadow_ray(RayItem(origin, item.sample_index, light_sample.direction, light_sample.distance));
 }
 

@@ -12,7 +12,8 @@ uint queue_append(uint queue) {
     return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(lanes);
 }
 
-// Items are written as whole texels: of a struct, software Vulkan writes member by member, each in a loop over the threads.
+// Items are written as whole texels: of a struct, and of a part of a vector, software Vulkan writes member by member, each in a loop over
+// the threads.
 
 void append_hit(HitItem item) {
     uint texel = queue_append(QUEUE_HIT) * ITEM_TEXELS;
@@ -65,7 +66,8 @@ uint queue_item(uint index, uint queue) {
 
 /// Adds light to a pixel sample; the caller holds the sample's only item.
 void add_radiance(uint sample_index, vec3 added) {
-    radiance[sample_index].rgb = FETCH_FLOATS(radiances, sample_index).rgb + added;
+    vec4 before = FETCH_FLOATS(radiances, sample_index);
+    radiance[sample_index] = vec4(before.rgb + added, before.a);
 }
 
 /// Adds to a pixel sample's alpha: of what is still clear, the share that something covers.

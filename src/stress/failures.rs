@@ -32,7 +32,6 @@ fn failures() -> Result<Vec<Failure>> {
         |name, sabotage, scene, options: &Options| Failure { name, sabotage, scene, options: options.clone() };
     Ok(vec![
         failure("fixed-epsilon", Sabotage::FixedEpsilon, elsewhere(&table, 1e4, DVec3::ZERO), &options),
-        failure("tight-boxes", Sabotage::TightBoxes, built_in("cornell")?, &options),
         failure("far-away", Sabotage::NoRebase, elsewhere(&table, 1.0, DVec3::new(1e5, 0.0, -1e5)), &options),
         failure("vast-ground", Sabotage::NoRebase, plain, &Options { camera: on_plain, ..options.clone() }),
     ])
