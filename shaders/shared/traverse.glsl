@@ -42,7 +42,8 @@ const int MISSED = 0x7fffffff;
 /// than one conversion, and which plane is the near one needs no comparison.
 ///
 /// Distances are compared as integers, which orders them like floats where they are ≥ 0. Negative ones come before all others, in the wrong
-/// order: of several the largest integer is that of the smallest float. It is still no less than that of any far side, so that a box behind the ray is missed.
+/// order: of several the largest integer is that of the smallest float. It is no less than that of a far side that is negative, so that a box behind
+/// the ray is missed.
 int entry_of(GridRay ray, uvec4 child, float t_max) {
     vec3 middle = (vec3(ivec3(child.xyz)) - ray.origin) * ray.inverse;
     vec3 reach = uintBitsToFloat((child.xyz << 14u & 0x0fffc000u) | 0x30000000u) * ray.reach_inverse;
