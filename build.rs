@@ -1,4 +1,4 @@
-//! `shaders/shared/{layout,bindings,features}.glsl` → Rust; `shaders/*.comp` → SPIR-V 1.5, each for both ways of fetching,
+//! `shaders/shared/{constants,layout,bindings,features}.glsl` → Rust; `shaders/*.comp` → SPIR-V 1.5, each for both ways of fetching,
 //! plain, opaque and full (see `kernel.glsl`).
 
 use std::fmt::Write;
@@ -20,6 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         fs::write(out.join(format!("{name}.rs")), rust)?;
         Ok::<(), Box<dyn Error>>(())
     };
+    contract("constants", translate::constants)?;
     contract("layout", translate::layout)?;
     contract("bindings", translate::bindings)?;
     contract("features", translate::features)?;

@@ -99,15 +99,20 @@ fn rust_sizes_are_the_shaders_strides() {
 #[test]
 fn an_unknown_line_is_an_error() {
     for source in
-        ["struct A {\n mat4 m;\n};", "int f() { return 1; }", "const double X = 1.0;", "struct A {\n Missing m;\n};"]
+        ["struct A {\n mat4 m;\n};", "int f() { return 1; }", "const uint X = 1u;", "struct A {\n Missing m;\n};"]
     {
         assert!(translate::layout(source).is_err(), "{source}");
+    }
+    for source in ["const double X = 1.0;", "uint X = 1u;", "struct A {"] {
+        assert!(translate::constants(source).is_err(), "{source}");
     }
     for source in ["layout(binding = 1) buffer B { uint b[]; };", "IMAGE_BUFFER(1, a)"] {
         assert!(translate::bindings(source).is_err(), "{source}");
     }
     // Ids must be dense.
     assert!(translate::features("layout(constant_id = 1) const bool A = true;").is_err());
-    let good = translate::layout("/// Doc.\nstruct A {\n    /// M.\n    vec3 m;\n};\nconst uint N = 3u;").unwrap();
-    assert!(good.contains("pub m: [f32; 3]") && good.contains("pub const N: u32 = 3;"), "{good}");
+    let structs = translate::layout("/// Doc.\nstruct A {\n    /// M.\n    vec3 m;\n};").unwrap();
+    assert!(structs.contains("pub m: [f32; 3]"), "{structs}");
+    let constants = translate::constants("/// Doc.\nconst uint N = 3u;").unwrap();
+    assert!(constants.contains("pub const N: u32 = 3;"), "{constants}");
 }

@@ -7,6 +7,7 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
+#include "constants.glsl"
 #include "layout.glsl"
 #include "features.glsl"
 #ifdef PLAIN

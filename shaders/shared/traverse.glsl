@@ -46,7 +46,7 @@ const int MISSED = 0x7fffffff;
 /// the ray is missed.
 int entry_of(GridRay ray, uvec4 child, float t_max) {
     vec3 middle = (vec3(ivec3(child.xyz)) - ray.origin) * ray.inverse;
-    vec3 reach = uintBitsToFloat((child.xyz << 14u & 0x0fffc000u) | 0x30000000u) * ray.reach_inverse;
+    vec3 reach = uintBitsToFloat((child.xyz << REACH_SHIFT & REACH_MASK) | REACH_EXPONENT) * ray.reach_inverse;
     ivec3 near = floatBitsToInt(middle - reach);
     ivec3 far = floatBitsToInt(middle + reach);
     int first = max(near.x, max(near.y, near.z));

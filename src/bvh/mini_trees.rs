@@ -32,8 +32,8 @@ pub(super) fn build(references: &[Reference], recipe: Recipe) -> Bvh {
     let Summary { bounds, centers, .. } = Summary::of(references);
     let builder = Builder::new(recipe, &bounds);
     let trees = mini_trees(references, &centers, &builder);
-    let mean_area = trees.iter().map(|tree| tree.bounds.half_area()).sum::<f32>() / trees.len() as f32;
-    let subtrees: Vec<Subtree> = trees.par_iter().flat_map_iter(|tree| tree.below(LARGEST * mean_area)).collect();
+    let mean_area = trees.iter().map(|mini| mini.tree.bounds.half_area()).sum::<f32>() / trees.len() as f32;
+    let subtrees: Vec<Subtree> = trees.par_iter().flat_map_iter(|mini| mini.below(LARGEST * mean_area)).collect();
     let reference = |(index, subtree): (u32, &Subtree)| {
         Reference::new(subtree.bounds.lo.truncate(), subtree.bounds.hi.truncate(), index)
     };
@@ -120,9 +120,7 @@ impl<'a> ByCell<'a> {
 
 /// The tree of a cell.
 struct MiniTree {
-    bounds: Box4,
-    root: Child,
-    nodes: Vec<Node>,
+    tree: Tree,
     /// In the order of its leaves.
     primitives: Vec<u32>,
 }
@@ -140,8 +138,8 @@ fn mini_trees(references: &[Reference], centers: &Box4, builder: &Builder) -> Ve
         if own.len() > CROWD && own.len() < references.len() {
             return mini_trees(&own, &Summary::of(&own).centers, builder);
         }
-        let Tree { bounds, root, nodes } = builder.tree(&mut own, FIRST_LEVEL);
-        vec![MiniTree { bounds, root, nodes, primitives: own.iter().map(Reference::primitive).collect() }]
+        let tree = builder.tree(&mut own, FIRST_LEVEL);
+        vec![MiniTree { tree, primitives: own.iter().map(Reference::primitive).collect() }]
     };
     (0..grid.cells()).into_par_iter().flat_map_iter(trees).collect()
 }
@@ -149,12 +147,13 @@ fn mini_trees(references: &[Reference], centers: &Box4, builder: &Builder) -> Ve
 impl MiniTree {
     /// Its largest subtrees with no more than so much half area, in the order of their leaves.
     fn below(&self, largest: f32) -> Vec<Subtree<'_>> {
+        let Tree { bounds, root, nodes } = &self.tree;
         let mut subtrees = Vec::new();
-        let mut open = vec![(self.root, self.bounds, self.nodes.len(), self.primitives.len())];
+        let mut open = vec![(*root, *bounds, nodes.len(), self.primitives.len())];
         while let Some((root, bounds, node_end, place_end)) = open.pop() {
             match root {
                 Child::Node(node) if bounds.half_area() > largest => {
-                    let Node { bounds, children } = &self.nodes[node as usize];
+                    let Node { bounds, children } = &nodes[node as usize];
                     let left_end = match children[1] {
                         Child::Node(right) => right as usize,
                         Child::Leaf { .. } => node_end,
@@ -171,7 +170,7 @@ impl MiniTree {
                     subtrees.push(Subtree {
                         bounds,
                         root,
-                        nodes: &self.nodes[first_node..node_end],
+                        nodes: &nodes[first_node..node_end],
                         first_place,
                         primitives: &self.primitives[first_place as usize..place_end],
                     });
@@ -185,7 +184,7 @@ impl MiniTree {
     fn first_place(&self, mut child: Child) -> u32 {
         loop {
             match child {
-                Child::Node(node) => child = self.nodes[node as usize].children[0],
+                Child::Node(node) => child = self.tree.nodes[node as usize].children[0],
                 Child::Leaf { first, .. } => return first,
             }
         }

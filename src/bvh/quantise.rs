@@ -12,7 +12,7 @@
 //! quanta, so the further away a camera stands, the wider.
 
 use super::{Aabb, Bvh, Child, WideChild};
-use crate::layout::{GRID_MIDDLE, GRID_PARTS};
+use crate::layout::{GRID_MIDDLE, GRID_PARTS, GRID_REACH, REACH_EXPONENT, REACH_MASK, REACH_SHIFT};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -20,12 +20,8 @@ use rayon::prelude::*;
 const LAST: f64 = 261_882.0;
 /// Slab error in quanta, for each quantum between ray origin and box: five roundings of 2⁻²⁴ and a reciprocal, doubled.
 const SLAB_ERROR: f64 = 9e-7;
-/// Bits of a reach's mantissa.
-const MANTISSA: u32 = 9;
 /// Largest code of a reach.
-const LAST_REACH: u32 = (1 << 14) - 1;
-/// The reach with code 0, quanta.
-const LEAST_REACH: f64 = 1.0 / 32768.0;
+const LAST_REACH: u32 = REACH_MASK >> REACH_SHIFT;
 
 /// The grid: coordinate = (position − origin) · scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,16 +46,16 @@ const NO_CHILD: [u32; 4] = [1 << 31, 1 << 31, 1 << 31, !0];
 
 /// How far a box with this code of a reach goes to either side, quanta.
 fn reach(code: u32) -> f64 {
-    let mantissa = f64::from(code & ((1 << MANTISSA) - 1)) / f64::from(1 << MANTISSA);
-    LEAST_REACH * f64::from(code >> MANTISSA).exp2() * (1.0 + mantissa)
+    f64::from(GRID_REACH) * f64::from(f32::from_bits((code << REACH_SHIFT) | REACH_EXPONENT))
 }
 
-/// The code of the least reach that is not below this one, or without `outward` of one beside it.
-fn code_of(reach: f64, outward: bool) -> u32 {
-    let cut = f64::MANTISSA_DIGITS - 1 - MANTISSA;
-    let bits = (reach / LEAST_REACH).max(1.0).to_bits();
-    let rounded = (bits + if outward { (1 << cut) - 1 } else { 1 << (cut - 1) }) >> cut;
-    (rounded - (1.0_f64.to_bits() >> cut)).min(LAST_REACH.into()) as u32
+/// The code of the least reach that is not below `needed` quanta, or without `outward` of one beside it.
+fn code_of(needed: f64, outward: bool) -> u32 {
+    let cut = f64::MANTISSA_DIGITS - f32::MANTISSA_DIGITS + REACH_SHIFT;
+    let least = reach(0);
+    let round = if outward { (1 << cut) - 1 } else { 1 << (cut - 1) };
+    let code = ((needed.max(least).to_bits() + round) >> cut) - (least.to_bits() >> cut);
+    code.min(LAST_REACH.into()) as u32
 }
 
 /// The word of an axis along which a box lies between two coordinates: one that holds it, or without `outward` one near it.
@@ -72,7 +68,7 @@ fn axis(lower: f64, upper: f64, outward: bool) -> u32 {
         let whole = (middle - fraction).round().clamp(0.0, LAST);
         let needed = half + (whole + fraction - middle).abs();
         if !outward || code == LAST_REACH || reach(code) >= needed {
-            return ((whole as i32 - GRID_MIDDLE as i32) << 14) as u32 | code;
+            return ((whole - f64::from(GRID_MIDDLE)) * f64::from(GRID_PARTS)) as i32 as u32 | code;
         }
         // The fraction is the code's own: the next ones differ by little.
         code = code_of(needed, true).max(code + 1);
@@ -130,12 +126,12 @@ pub fn quantise(bvh: &Bvh, reach: Vec3, outward: bool, refer: impl Fn(Child) -> 
 mod tests {
     use super::super::{Side, Wide, WIDTH};
     use super::*;
-    use crate::layout::GRID_REACH;
 
     /// Where an axis' word says that a box begins and ends, quanta; what the kernels do.
     fn ends(word: u32) -> (f64, f64) {
         let middle = f64::from(word as i32) / f64::from(GRID_PARTS) + f64::from(GRID_MIDDLE);
-        let reach = f64::from(GRID_REACH) * f64::from(f32::from_bits((word << 14 & 0x0fff_c000) | 0x3000_0000));
+        let reach =
+            f64::from(GRID_REACH) * f64::from(f32::from_bits((word << REACH_SHIFT & REACH_MASK) | REACH_EXPONENT));
         (middle - reach, middle + reach)
     }
 

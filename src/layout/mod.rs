@@ -1,4 +1,4 @@
-//! What host and device share, generated from `shaders/shared/{layout,bindings,features}.glsl` by `build.rs`.
+//! What host and device share, generated from `shaders/shared/{constants,layout,bindings,features}.glsl` by `build.rs`.
 //!
 //! Structs are `#[repr(C)]` with 4-byte members only, which is exactly GLSL's scalar block layout. Holds no logic.
 
@@ -8,6 +8,7 @@ pub mod translate;
 
 #[allow(clippy::excessive_precision)]
 mod generated {
+    include!(concat!(env!("OUT_DIR"), "/constants.rs"));
     include!(concat!(env!("OUT_DIR"), "/layout.rs"));
 }
 pub use generated::*;

@@ -1,4 +1,4 @@
-//! Translates the three contract files of `shaders/shared/` into Rust. `build.rs` compiles this file too.
+//! Translates the contract's files of `shaders/shared/` into Rust. `build.rs` compiles this file too.
 //!
 //! The subset: `///` comments, `const` scalars, flat `struct`s of scalars, vectors and earlier structs, the buffer macros of
 //! `bindings.glsl`, and boolean specialization constants. Anything else is an error that names file and line.
@@ -48,7 +48,19 @@ fn walk(file: &str, source: &str, mut declare: impl FnMut(&str, &str) -> Option<
     Ok(())
 }
 
-/// `layout.glsl` → constants and `#[repr(C)]` structs.
+/// `constants.glsl` → constants.
+pub fn constants(source: &str) -> Result<String, Unknown> {
+    let mut out = String::new();
+    walk("constants.glsl", source, |line, doc| {
+        let (kind, rest) = line.strip_prefix("const ")?.strip_suffix(';')?.split_once(' ')?;
+        let (name, value) = rest.split_once(" = ")?;
+        let value = value.strip_suffix('u').unwrap_or(value);
+        writeln!(out, "/// {doc}\npub const {name}: {} = {value};", rust_type(kind)?).ok()
+    })?;
+    Ok(out)
+}
+
+/// `layout.glsl` → `#[repr(C)]` structs and the list of their members.
 pub fn layout(source: &str) -> Result<String, Unknown> {
     let mut out = String::new();
     let mut members = String::new();
@@ -67,15 +79,11 @@ pub fn layout(source: &str) -> Result<String, Unknown> {
             let holder = structs.last()?;
             writeln!(members, "    (\"{holder}\", \"{name}\", std::mem::offset_of!({holder}, {name})),").ok()?;
             writeln!(out, "    /// {doc}\n    pub {name}: {kind},").ok()
-        } else if let Some(name) = line.strip_prefix("struct ").and_then(|rest| rest.strip_suffix(" {")) {
+        } else {
+            let name = line.strip_prefix("struct ")?.strip_suffix(" {")?;
             inside = true;
             structs.push(name.to_owned());
             writeln!(out, "/// {doc}\n#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\n#[repr(C)]\npub struct {name} {{").ok()
-        } else {
-            let (kind, rest) = line.strip_prefix("const ")?.strip_suffix(';')?.split_once(' ')?;
-            let (name, value) = rest.split_once(" = ")?;
-            let value = value.strip_suffix('u').unwrap_or(value);
-            writeln!(out, "/// {doc}\npub const {name}: {} = {value};", rust_type(kind)?).ok()
         }
     })?;
     let doc = "/// Struct, member and byte offset of everything in the contract.";
