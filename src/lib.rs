@@ -12,7 +12,7 @@
 //! # The data's path
 //! ```text
 //! scene.glb ─scene::gltf→ Asset (meshes, materials, decoded pictures) ─ a time → Scene
-//! Scene ─┬─ Soup ─bvh→ Tree (one, or one a shared mesh and one over instances) ─ quantised records ─┐
+//! Scene ─┬─ Soup ─bvh→ Tree (one, or one a shared mesh and one over instances) ─ quantised nodes ───┐
 //!        ├─ View (camera, lights, size)                                      render::upload → device buffers
 //!        └─ Features → specialization constants, passes, buffers (render::Plan)
 //! a sequence: Asset ─ times → Scenes, each Tree refitted from the one before or built anew

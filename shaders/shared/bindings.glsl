@@ -2,13 +2,17 @@
 // A FETCH buffer holds uvec4 texels read through FETCH(name, i): on software Vulkan a storage texel buffer, which it reads twice as
 // fast as a storage buffer and, because it does not call a function for it, faster than a uniform texel buffer; elsewhere
 // a storage buffer. A kernel is compiled for both.
-// A FETCH_VIEW shows a storage buffer that an earlier pass wrote in the same way.
+// A FETCH_VIEW shows a storage buffer that an earlier pass wrote in the same way, FETCH_WORDS a FETCH buffer word by word: FETCH_WORD(name, i).
 #ifdef FETCH_FROM_STORAGE
 #define FETCH_BUFFER(slot, name) layout(set = 0, binding = slot, std430) readonly buffer name##_block { uvec4 name[]; };
 #define FETCH(name, index) name[index]
+#define FETCH_WORDS(slot, name, of) layout(set = 0, binding = slot, std430) readonly buffer name##_block { uint name[]; };
+#define FETCH_WORD(name, index) name[index]
 #else
 #define FETCH_BUFFER(slot, name) layout(set = 0, binding = slot, rgba32ui) uniform readonly restrict uimageBuffer name;
 #define FETCH(name, index) imageLoad(name, int(index))
+#define FETCH_WORDS(slot, name, of) layout(set = 0, binding = slot, r32ui) uniform readonly restrict uimageBuffer name;
+#define FETCH_WORD(name, index) imageLoad(name, int(index)).x
 #endif
 #define FETCH_VIEW(slot, name, of) FETCH_BUFFER(slot, name)
 // A texel as floats.
@@ -18,7 +22,7 @@
 #define UNIFORM_BUFFER(slot, type, name) layout(set = 0, binding = slot, scalar) uniform name##_block { type name##_shared; }; type name;
 #define PUSH_CONSTANTS(type, name) layout(push_constant, scalar) uniform name##_block { type name##_shared; }; type name;
 
-/// Tree: NODE_TEXELS a node, one child record each: its box along each axis on the grid (src/bvh/quantise.rs), then the child's reference.
+/// Tree: NODE_TEXELS a node: its four children's boxes on the grid (src/bvh/quantise.rs) along x, along y, along z, and their references.
 FETCH_BUFFER(0, nodes)
 /// Triangles in leaf order: three positions as float bits; w = primitive, material, TRIANGLE_ flags.
 FETCH_BUFFER(1, triangles)
@@ -79,5 +83,7 @@ FETCH_VIEW(27, film_rest_so_far, film_rest)
 FETCH_BUFFER(28, filter_steps)
 /// Tracing again subtree by subtree: what each ray in the retrace queue has hit so far, three texels.
 STORAGE_BUFFER(29, uvec4, partial_hits)
+/// The tree, for a child's reference alone.
+FETCH_WORDS(30, node_words, nodes)
 
 PUSH_CONSTANTS(Step, step_now)

@@ -7,8 +7,11 @@ const uint WORKGROUP = 64u;
 const uint TILE = 8u;
 /// Hard bound on the depth of the tree, binary or wide: the builder keeps it, the traversal's array stack relies on it.
 const uint MAX_TREE_DEPTH = 64u;
-/// Nodes that the traversal's stack of registers holds.
-const uint STACK_REGISTERS = 14u;
+/// Groups of siblings that the traversal's stack of registers holds.
+const uint STACK_REGISTERS = 10u;
+/// Most nodes of four children in a tree, or in all trees together: a group of siblings has 23 bits for its node, all of them set where an instance was
+/// entered.
+const uint MOST_NODES = 0x7fffffu;
 /// Most triangles in a leaf that its 32-bit reference can name.
 const uint MAX_LEAF_TRIANGLES = 14u;
 /// In place of a leaf's number of triangles: it is an instance.
@@ -25,7 +28,7 @@ const uint REACH_MASK = 0x0fffc000u;
 const uint REACH_EXPONENT = 0x30000000u;
 /// Quanta that a box whose reach is 1 reaches to either side.
 const float GRID_REACH = 65536.0;
-/// Texels (16 bytes) in one tree node: a record for each of its children.
+/// Texels (16 bytes) in one tree node: its four children's boxes along x, along y and along z, and their references.
 const uint NODE_TEXELS = 4u;
 /// Texels in one triangle of the traversal, and in one triangle's normals, colours, texture coordinates or tangents.
 const uint TRIANGLE_TEXELS = 3u;

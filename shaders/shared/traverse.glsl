@@ -1,5 +1,6 @@
 // The tree and the walk through it: nodes of four quantised boxes, walked while-while (Aila and Laine, HPG 2009), the
-// nearest child first. The stack is a shift register: a few variables that move up and down, touched with constant indices
+// nearest child first. What waits on the stack are groups: all of a node's children that are still to be visited are one entry (as in Ylitie,
+// Karras and Laine, HPG 2017). The stack is a shift register: a few variables that move up and down, touched with constant indices
 // only, because an indexed array costs software Vulkan eight scalar branches a push. When a live entry falls off its end,
 // the ray goes to the retrace queue, where a variant of the same kernel walks again with an array as deep as the tree can be:
 // rare, and no ray is ever lost. The same happens to a ray that f32 cannot tell whether it hits, and to a walk that the driver
@@ -10,13 +11,13 @@
 
 /// No node: the stack is empty.
 const int NOTHING = int(0x80000000);
-/// On the stack where an instance was entered: back to the world.
+/// In place of a node: back from an instance to the world.
 const int LEAVE = int(0x80000001);
 const int REGISTERS = int(STACK_REGISTERS);
 /// A node that no tree has. Every loop here also ends at it, see is_complete.
 const int IMPOSSIBLE = 0x7fffffff;
 
-/// The ray as a child's record needs it: see src/bvh/quantise.rs.
+/// The ray as boxes need it: see src/bvh/quantise.rs.
 struct GridRay {
     /// In parts of a quantum, from the middle of the grid.
     vec3 origin;
@@ -34,66 +35,91 @@ GridRay grid_ray(Ray ray, vec3 grid_origin, vec3 grid_scale) {
                    abs(inverse) * GRID_REACH);
 }
 
-/// In place of the distance at which a ray enters a box: it does not.
-const int MISSED = 0x7fffffff;
+/// Three bits for a child: IS_CHILD and its place among its siblings.
+const uint CODE_BITS = 3u;
+const uint CODE_MASK = 7u;
+const uint IS_CHILD = 4u;
+const uint PLACE_MASK = 3u;
+/// The key of a child whose box the ray does not enter; its code is 0.
+const int MISSED = 0x7ffffff8;
 
-/// Slab test against a child's box: the distance at which the ray enters it, something negative if it starts inside, or MISSED. An axis
-/// is a word: as an integer the middle of the box, its last bits a small float that says how far the box reaches to either side. Neither needs more
-/// than one conversion, and which plane is the near one needs no comparison.
+/// The key of a node's child, by which children are ordered: the bits of the distance at which the ray enters the child's box, something negative if it
+/// starts inside, with the child's code for the last of them; or MISSED. Along an axis a box is a word: as an integer the middle of the box, its last bits a
+/// small float that says how far the box reaches to either side. Neither needs more than one conversion, and which plane is the near one needs
+/// no comparison.
 ///
 /// Distances are compared as integers, which orders them like floats where they are ≥ 0. Negative ones come before all others, in the wrong
 /// order: of several the largest integer is that of the smallest float. It is no less than that of a far side that is negative, so that a box behind
 /// the ray is missed.
-int entry_of(GridRay ray, uvec4 child, float t_max) {
-    vec3 middle = (vec3(ivec3(child.xyz)) - ray.origin) * ray.inverse;
-    vec3 reach = uintBitsToFloat((child.xyz << REACH_SHIFT & REACH_MASK) | REACH_EXPONENT) * ray.reach_inverse;
+int key_of(GridRay ray, uvec3 box, uint place, float t_max) {
+    vec3 middle = (vec3(ivec3(box)) - ray.origin) * ray.inverse;
+    vec3 reach = uintBitsToFloat((box << REACH_SHIFT & REACH_MASK) | REACH_EXPONENT) * ray.reach_inverse;
     ivec3 near = floatBitsToInt(middle - reach);
     ivec3 far = floatBitsToInt(middle + reach);
     int first = max(near.x, max(near.y, near.z));
     int last = min(min(far.x, far.y), min(far.z, floatBitsToInt(t_max)));
-    return first > last ? MISSED : first;
+    return first > last ? MISSED : int((uint(first) & ~CODE_MASK) | IS_CHILD | place);
 }
 
-/// A child as a ray meets it.
-struct Branch {
-    int entry;
-    int node;
-};
-
-Branch branch(GridRay ray, uvec4 child, float t_max) {
-    return Branch(entry_of(ray, child, t_max), int(child.w));
+void order(inout int nearer, inout int farther) {
+    int least = min(nearer, farther);
+    farther = max(nearer, farther);
+    nearer = least;
 }
 
-void swap_unless_nearer(inout Branch first, inout Branch second) {
-    bool swapped = second.entry < first.entry;
-    int farther = max(first.entry, second.entry);
-    first.entry = min(first.entry, second.entry);
-    second.entry = farther;
-    int node = swapped ? second.node : first.node;
-    second.node = swapped ? first.node : second.node;
-    first.node = node;
-}
-
-/// A node's children, nearest first, those that are missed last.
-struct Visit {
-    Branch first;
-    Branch second;
-    Branch third;
-    Branch fourth;
-};
-
-Visit visit(GridRay ray, int node, float t_max) {
+/// The keys of a node's children, in order.
+ivec4 visit(GridRay ray, int node, float t_max) {
     uint texel = uint(node) * NODE_TEXELS;
     // All are fetched before any is tested, so that the processor waits for all at once.
-    uvec4 children[4] = {FETCH(nodes, texel), FETCH(nodes, texel + 1u), FETCH(nodes, texel + 2u), FETCH(nodes, texel + 3u)};
-    Visit next = Visit(branch(ray, children[0], t_max), branch(ray, children[1], t_max), branch(ray, children[2], t_max),
-                       branch(ray, children[3], t_max));
-    swap_unless_nearer(next.first, next.second);
-    swap_unless_nearer(next.third, next.fourth);
-    swap_unless_nearer(next.first, next.third);
-    swap_unless_nearer(next.second, next.fourth);
-    swap_unless_nearer(next.second, next.third);
-    return next;
+    uvec4 x = FETCH(nodes, texel);
+    uvec4 y = FETCH(nodes, texel + 1u);
+    uvec4 z = FETCH(nodes, texel + 2u);
+    ivec4 keys = ivec4(key_of(ray, uvec3(x.x, y.x, z.x), 0u, t_max), key_of(ray, uvec3(x.y, y.y, z.y), 1u, t_max),
+                       key_of(ray, uvec3(x.z, y.z, z.z), 2u, t_max), key_of(ray, uvec3(x.w, y.w, z.w), 3u, t_max));
+    order(keys.x, keys.y);
+    order(keys.z, keys.w);
+    order(keys.x, keys.z);
+    order(keys.y, keys.w);
+    order(keys.y, keys.z);
+    return keys;
+}
+
+/// A group of children of one node: the node, then the codes of at most three, the nearest in the lowest bits.
+const uint GROUP_BITS = 3u * CODE_BITS;
+const uint GROUP_MASK = (1u << GROUP_BITS) - 1u;
+/// The group of none.
+const uint NO_GROUP = 0u;
+/// In place of a group where an instance was entered.
+const uint LEAVE_GROUP = MOST_NODES << GROUP_BITS | IS_CHILD;
+
+/// The nearest child of a visited node alone.
+uint nearest_of(int node, ivec4 keys) {
+    return uint(node) << GROUP_BITS | (uint(keys.x) & CODE_MASK);
+}
+
+/// The other children that the ray meets.
+uint others_of(int node, ivec4 keys) {
+    uvec4 codes = uvec4(keys) & CODE_MASK;
+    return uint(node) << GROUP_BITS | codes.w << (2u * CODE_BITS) | codes.z << CODE_BITS | codes.y;
+}
+
+/// The reference of a group's nearest child; NOTHING of an empty one.
+int first_of(uint group) {
+    bool leaves = INSTANCES && group == LEAVE_GROUP;
+    uint node = leaves ? 0u : group >> GROUP_BITS;
+    // The last of a node's texels.
+    uint word = 4u * (NODE_TEXELS * node + NODE_TEXELS - 1u) + (group & PLACE_MASK);
+    int reference = leaves ? LEAVE : int(FETCH_WORD(node_words, word));
+    return (group & IS_CHILD) != 0u ? reference : NOTHING;
+}
+
+/// A group without its nearest child.
+uint rest_of(uint group) {
+    return (group & ~GROUP_MASK) | (group & GROUP_MASK) >> CODE_BITS;
+}
+
+bool is_empty(uint group) {
+    return (group & GROUP_MASK) == 0u;
 }
 
 /// Where a walk is: in the world's tree, or, with INSTANCES, in the tree of an instance, with the ray in its space. The ray's
@@ -163,36 +189,37 @@ bool is_complete(int node, bool cut) {
     return node == NOTHING && !cut;
 }
 
-/// The walk through a subtree with an array for a stack, with room for three siblings on each level of any two trees. The host
+/// The walk through a subtree with an array for a stack, with room for a group on each level of any two trees and the mark between them. The host
 /// looks at the count of those that are cut short even so: a wrong picture is never written.
 void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
-    int stack[2u * 3u * MAX_TREE_DEPTH + 1u];
+    uint stack[2u * MAX_TREE_DEPTH + 1u];
     int height = 0;
     Walk walk = begin_walk(world_ray);
     int node = any && hit.triangle != NO_TRIANGLE ? NOTHING : int(step_now.root);
     while (node != NOTHING && node != IMPOSSIBLE) {
         bool found = false;
         if (node >= 0) {
-            Visit next = visit(walk.grid, node, hit.t);
-            if (next.fourth.entry != MISSED)
-                stack[height++] = next.fourth.node;
-            if (next.third.entry != MISSED)
-                stack[height++] = next.third.node;
-            if (next.second.entry != MISSED)
-                stack[height++] = next.second.node;
-            node = next.first.node;
-            if (next.first.entry != MISSED)
+            ivec4 keys = visit(walk.grid, node, hit.t);
+            if (keys.y != MISSED)
+                stack[height++] = others_of(node, keys);
+            node = first_of(nearest_of(node, keys));
+            if (keys.x != MISSED)
                 continue;
         } else if (INSTANCES && node == LEAVE) {
             leave_instance(walk, world_ray);
         } else if (is_instance(node)) {
-            stack[height++] = LEAVE;
+            stack[height++] = LEAVE_GROUP;
             node = enter_instance(walk, world_ray, node);
             continue;
         } else {
             found = visit_leaf(walk, node, any, hit);
         }
-        node = height > 0 && !(any && found) ? stack[--height] : NOTHING;
+        uint group = height > 0 && !(any && found) ? stack[height - 1] : NO_GROUP;
+        node = first_of(group);
+        if (is_empty(rest_of(group)))
+            height--;
+        else
+            stack[height - 1] = rest_of(group);
     }
     if (!is_complete(node, walk.cut))
         atomicAdd(counters[COUNTER_LOST], 1u);
@@ -200,76 +227,54 @@ void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
 
 /// A stack in registers: the top is entry 0.
 struct Stack {
-    int entries[REGISTERS];
+    uint groups[REGISTERS];
     /// Not 0 when an entry was lost.
-    int overflow;
+    uint overflow;
 };
 
-/// Moves the entries up by `places`.
-void shift(inout Stack stack, int places) {
-    [[unroll]] for (int i = REGISTERS - 1; i >= places; i--)
-        stack.entries[i] = stack.entries[i - places];
-}
-
-/// Remembers that an entry falls off the end, if it was a node.
-void note_loss(inout Stack stack, bool is_lost, int entry) {
+/// Here and below selections, no branches: what software Vulkan assigns in a branch it moves twice.
+void push(inout Stack stack, bool pushed, uint group) {
     if (DEEP_TREE)
-        stack.overflow |= is_lost ? entry ^ NOTHING : 0;
+        stack.overflow |= pushed ? stack.groups[REGISTERS - 1] : NO_GROUP;
+    [[unroll]] for (int i = REGISTERS - 1; i > 0; i--)
+        stack.groups[i] = pushed ? stack.groups[i - 1] : stack.groups[i];
+    stack.groups[0] = pushed ? group : stack.groups[0];
 }
 
-void push(inout Stack stack, int node) {
-    note_loss(stack, true, stack.entries[REGISTERS - 1]);
-    shift(stack, 1);
-    stack.entries[0] = node;
-}
-
-/// All but the nearest, the farthest first: in two moves, of two places and of one.
-void push_siblings(inout Stack stack, Visit next) {
-    bool one = next.second.entry != MISSED;
-    bool two = next.third.entry != MISSED;
-    bool three = next.fourth.entry != MISSED;
-    note_loss(stack, one, stack.entries[REGISTERS - 1]);
-    note_loss(stack, two, stack.entries[REGISTERS - 2]);
-    note_loss(stack, three, stack.entries[REGISTERS - 3]);
-    if (two)
-        shift(stack, 2);
-    if (one && (three || !two))
-        shift(stack, 1);
-    stack.entries[0] = one ? next.second.node : stack.entries[0];
-    stack.entries[1] = two ? next.third.node : stack.entries[1];
-    stack.entries[2] = three ? next.fourth.node : stack.entries[2];
-}
-
-void pop(inout Stack stack) {
+/// Drops the nearest child of the group at the top, and the group when it was the last.
+void drop_first(inout Stack stack, bool dropped) {
+    uint rest = rest_of(stack.groups[0]);
+    bool popped = dropped && is_empty(rest);
+    stack.groups[0] = dropped ? rest : stack.groups[0];
     [[unroll]] for (int i = 0; i < REGISTERS - 1; i++)
-        stack.entries[i] = stack.entries[i + 1];
-    stack.entries[REGISTERS - 1] = NOTHING;
+        stack.groups[i] = popped ? stack.groups[i + 1] : stack.groups[i];
+    stack.groups[REGISTERS - 1] = popped ? NO_GROUP : stack.groups[REGISTERS - 1];
 }
 
 /// The walk with registers for a stack; false if it is worth nothing: the stack overflowed, the walk was cut short, or a triangle left it uncertain.
 bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
     Walk walk = begin_walk(world_ray);
     Stack stack;
-    stack.overflow = 0;
+    stack.overflow = 0u;
     [[unroll]] for (int i = 0; i < REGISTERS; i++)
-        stack.entries[i] = NOTHING;
+        stack.groups[i] = NO_GROUP;
     int node = 0;
     do {
         // An inner node, and not IMPOSSIBLE.
         do {
             if (uint(node) < uint(IMPOSSIBLE)) {
-                Visit next = visit(walk.grid, node, hit.t);
-                bool none = next.first.entry == MISSED;
-                node = none ? stack.entries[0] : next.first.node;
-                push_siblings(stack, next);
-                if (none)
-                    pop(stack);
+                ivec4 keys = visit(walk.grid, node, hit.t);
+                bool none = keys.x == MISSED;
+                uint group = none ? stack.groups[0] : nearest_of(node, keys);
+                push(stack, keys.y != MISSED, others_of(node, keys));
+                drop_first(stack, none);
+                node = first_of(group);
             }
         } while (uint(node) < uint(IMPOSSIBLE));
         if (node >= 0 || node == NOTHING)
             break;
         if (is_instance(node)) {
-            push(stack, LEAVE);
+            push(stack, true, LEAVE_GROUP);
             node = enter_instance(walk, world_ray, node);
             continue;
         }
@@ -278,15 +283,15 @@ bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
             leave_instance(walk, world_ray);
         else
             found = visit_leaf(walk, node, any, hit);
-        node = stack.entries[0];
-        pop(stack);
+        node = first_of(stack.groups[0]);
+        drop_first(stack, true);
         if (any && found) {
             node = NOTHING;
-            stack.overflow = 0;
+            stack.overflow = 0u;
             walk.uncertain = false;
         }
     } while (node != NOTHING);
-    return is_complete(node, walk.cut) && stack.overflow == 0 && !walk.uncertain;
+    return is_complete(node, walk.cut) && stack.overflow == 0u && !walk.uncertain;
 }
 
 /// Finds the nearest hit, or with `any` some hit, closer than hit.t; a miss leaves hit as it was. False: the ray must be traced

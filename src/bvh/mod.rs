@@ -1,7 +1,7 @@
 //! Boxes or triangles → a binary bounding volume hierarchy over them. Knows no meshes.
 //!
-//! [`Bvh::over_boxes`] makes the tree in f32 by the surface area heuristic, [`Bvh::over_triangles`] may also cut triangles; [`quantise`] turns it, four children a node, into the
-//! 16-byte child records that the kernels walk. The tree's depth is bounded, hard, by `MAX_TREE_DEPTH`: the traversal's stack relies on it.
+//! [`Bvh::over_boxes`] makes the tree in f32 by the surface area heuristic, [`Bvh::over_triangles`] may also cut triangles; [`quantise`] turns it, four children a node, into what
+//! the kernels walk. The tree's depth is bounded, hard, by `MAX_TREE_DEPTH`: the traversal's stack relies on it.
 
 mod aabb;
 mod build;
@@ -16,7 +16,7 @@ mod stats;
 mod wide;
 
 pub use aabb::Aabb;
-pub use quantise::{quantise, reference, Grid, Quantised};
+pub use quantise::{quantise, reference, DeviceNode, Grid, Quantised};
 pub use stats::Stats;
 pub use wide::{Side, Wide, WideChild, WideNode, WIDTH};
 

@@ -1,7 +1,7 @@
-//! The tree as the kernels walk it: one 16-byte record a child, boxes on a grid of some 2¹⁸ quanta an axis over the whole scene.
+//! The tree as the kernels walk it: 64 bytes a wide node, boxes on a grid of some 2¹⁸ quanta an axis over the whole scene.
 //!
-//! A record: `x`, `y`, `z`, the box along each axis, and `w`, the child: an inner node's index, or `!(first << 4 | count)` for a
-//! leaf. An axis is `(middle − 2¹⁷) << 14 | reach`. As a signed integer it is the box's middle in 16384ths of a quantum, the reach being
+//! A node: its four children's boxes along x, those along y, those along z, and their references: an inner node's index, or `!(first << 4 | count)` for a
+//! leaf. A box along an axis is `(middle − 2¹⁷) << 14 | reach`. As a signed integer it is the box's middle in 16384ths of a quantum, the reach being
 //! a known fraction; the reach is a small float without a sign, five bits of exponent and nine of mantissa, how far the box goes to either side:
 //! `2^(reach >> 9) · (1 + (reach & 511) / 512)` in 2⁻¹⁵ quanta. Small boxes thus grow by about a quantum and large ones by 1 in
 //! 1024; a kernel converts one number and shifts the other, and needs no comparison to tell a box's near plane from its far one.
@@ -11,7 +11,7 @@
 //! Boxes are rounded outward, by more than the slab test's own error: about 4e-7 of the distance to the origin of the ray in
 //! quanta, so the further away a camera stands, the wider.
 
-use super::{Aabb, Bvh, Child, WideChild};
+use super::{Aabb, Bvh, Child, WideChild, WideNode, WIDTH};
 use crate::layout::{GRID_MIDDLE, GRID_PARTS, GRID_REACH, REACH_EXPONENT, REACH_MASK, REACH_SHIFT};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -32,11 +32,14 @@ pub struct Grid {
     pub scale: Vec3,
 }
 
+/// A wide node for the device: its children's boxes along x, y and z, and their references.
+pub type DeviceNode = [[u32; WIDTH]; 4];
+
 /// A tree for the device.
 #[derive(Clone, Debug)]
 pub struct Quantised {
-    /// One for each child of a wide node, WIDTH a node.
-    pub records: Vec<[u32; 4]>,
+    /// One for each wide node.
+    pub nodes: Vec<DeviceNode>,
     /// Their grid.
     pub grid: Grid,
 }
@@ -111,20 +114,23 @@ pub fn quantise(bvh: &Bvh, reach: Vec3, outward: bool, refer: impl Fn(Child) -> 
     let rough = Grid::over(&bounds, 1.0);
     let margin = 0.05 + ((reach + far) * rough.scale.as_dvec3()).max_element() * SLAB_ERROR;
     let grid = Grid::over(&bounds, margin + 1.0);
-    let record = |child: &Option<WideChild>| {
+    let record = |child: Option<WideChild>| {
         let Some(WideChild { side, child }) = child else { return NO_CHILD };
-        let bounds = bvh.bounds_of(*side);
+        let bounds = bvh.bounds_of(side);
         let margin = if outward { margin } else { 0.0 };
         let (lo, hi) = (grid.coordinate(bounds.lo) - margin, grid.coordinate(bounds.hi) + margin);
-        [axis(lo.x, hi.x, outward), axis(lo.y, hi.y, outward), axis(lo.z, hi.z, outward), refer(*child)]
+        [axis(lo.x, hi.x, outward), axis(lo.y, hi.y, outward), axis(lo.z, hi.z, outward), refer(child)]
     };
-    let records = bvh.wide.nodes.par_iter().flat_map_iter(|node| node.each_ref().map(record));
-    Quantised { records: records.collect(), grid }
+    let node = |node: &WideNode| {
+        let children = node.map(record);
+        [0, 1, 2, 3].map(|row| children.map(|child| child[row]))
+    };
+    Quantised { nodes: bvh.wide.nodes.par_iter().map(node).collect(), grid }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Side, Wide, WIDTH};
+    use super::super::{Side, Wide};
     use super::*;
 
     /// Where an axis' word says that a box begins and ends, quanta; what the kernels do.
@@ -170,9 +176,11 @@ mod tests {
             wide: Wide { nodes: vec![[wide(0), wide(1), None, None]], depth: 1, stack: 1 },
         };
         let quantised = quantise(&bvh, Vec3::ZERO, true, |child| reference(child, 0, 0));
-        assert_eq!(quantised.records[0][3], 0xffff_ff5c);
-        assert_eq!(quantised.records[1][3], 7);
-        assert_eq!(quantised.records[2..], [[0x8000_0000, 0x8000_0000, 0x8000_0000, 0xffff_ffff]; 2]);
+        let [boxes @ .., references] = quantised.nodes[0];
+        assert_eq!(references, [0xffff_ff5c, 7, 0xffff_ffff, 0xffff_ffff]);
+        for along in boxes {
+            assert_eq!(along[2..], [0x8000_0000; 2]);
+        }
     }
 
     #[test]
@@ -188,10 +196,10 @@ mod tests {
             let quantised = quantise(&bvh, Vec3::splat(reach), true, |child| reference(child, 0, 0));
             let world =
                 |coordinates: DVec3| coordinates / quantised.grid.scale.as_dvec3() + quantised.grid.origin.as_dvec3();
-            for (node, records) in bvh.wide.nodes.iter().zip(quantised.records.chunks(WIDTH)) {
-                for (child, [x, y, z, _]) in node.iter().flatten().zip(records) {
+            for (node, [x, y, z, _]) in bvh.wide.nodes.iter().zip(&quantised.nodes) {
+                for (place, child) in node.iter().flatten().enumerate() {
                     let bounds = bvh.bounds_of(child.side);
-                    let [(x_lo, x_hi), (y_lo, y_hi), (z_lo, z_hi)] = [*x, *y, *z].map(ends);
+                    let [(x_lo, x_hi), (y_lo, y_hi), (z_lo, z_hi)] = [x, y, z].map(|along| ends(along[place]));
                     let (lo, hi) = (world(DVec3::new(x_lo, y_lo, z_lo)), world(DVec3::new(x_hi, y_hi, z_hi)));
                     assert!(
                         lo.cmplt(bounds.lo.as_dvec3()).all() && hi.cmpgt(bounds.hi.as_dvec3()).all(),

@@ -34,7 +34,7 @@ pub struct Wide {
     pub nodes: Vec<WideNode>,
     /// Levels.
     pub depth: u32,
-    /// Most nodes that wait on the stack of a walk.
+    /// Most nodes of which children wait on the stack of a walk.
     pub stack: u32,
 }
 
@@ -63,7 +63,7 @@ impl Wide {
                 *child = child.map(|it| WideChild { child: Child::Node(index), ..it });
             }
             let children = bvh.children_of(node, &costs);
-            let waiting = waiting + (children.iter().flatten().count() as u32).saturating_sub(1);
+            let waiting = waiting + u32::from(children.iter().flatten().count() > 1);
             wide.depth = wide.depth.max(level);
             wide.stack = wide.stack.max(waiting);
             for (place, child) in children.into_iter().enumerate().rev() {
@@ -189,7 +189,7 @@ mod tests {
             Child::Leaf { .. } => None,
         });
         let (levels, waiting) = below.fold((0, 0), |all, one| (all.0.max(one.0), all.1.max(one.1)));
-        (levels + 1, waiting + children.len() as u32 - 1)
+        (levels + 1, waiting + u32::from(children.len() > 1))
     }
 
     /// Each primitive is below the root once, in a box that holds it, and each node is met once, after its parent.

@@ -3,9 +3,9 @@
 
 use super::textures::Textures;
 use super::{Prepared, TreeSize};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::layout::{
-    Features, HitItem, Light, RayItem, Texture, FILTER_STEPS, INSTANCE_TEXELS, MATERIAL_TEXELS, MAX_LAYERS,
+    Features, HitItem, Light, RayItem, Texture, FILTER_STEPS, INSTANCE_TEXELS, MATERIAL_TEXELS, MAX_LAYERS, MOST_NODES,
     NODE_TEXELS, TILE, TRIANGLE_TEXELS, WORKGROUP,
 };
 use crate::scene::{Scene, Soup, View};
@@ -75,10 +75,10 @@ impl Plan {
     /// The plan for a view of a scene with a tree of this size.
     ///
     /// # Errors
-    /// `Content` when its textures are too large.
+    /// `Content` when its textures or its tree are too large.
     pub fn new(prepared: &Prepared, scene: &Scene, features: Features, tree: TreeSize, in_flight: u32) -> Result<Self> {
         let textures = Textures::of(scene, features.textures, u64::MAX)?;
-        Ok(Self::with_textures(prepared, scene, features, tree, in_flight, &textures))
+        Self::with_textures(prepared, scene, features, tree, in_flight, &textures)
     }
 
     /// As [`Plan::new`], with textures that are ready for the device.
@@ -89,7 +89,11 @@ impl Plan {
         tree: TreeSize,
         in_flight: u32,
         textures: &Textures,
-    ) -> Self {
+    ) -> Result<Self> {
+        if tree.nodes > MOST_NODES as usize {
+            let why = format!("its tree has {} nodes, at most {MOST_NODES} can be traced; try --bvh fast", tree.nodes);
+            return Err(Error::content(&scene.name, why));
+        }
         let tiles = u64::from(view.width.div_ceil(TILE)) * u64::from(view.height.div_ceil(TILE));
         let padded_pixels = tiles * u64::from(TILE * TILE);
         let in_flight = in_flight.clamp(WORKGROUP, MOST_IN_FLIGHT) / WORKGROUP * WORKGROUP;
@@ -113,7 +117,7 @@ impl Plan {
         plan.plan_passes(view);
         plan.plan_buffers(scene, soup, view, tree, textures);
         plan.explain_left_out(view);
-        plan
+        Ok(plan)
     }
 
     /// Waves in the whole picture.
@@ -235,5 +239,26 @@ impl Plan {
     /// Bytes of the queues.
     pub fn queue_bytes(&self) -> u64 {
         self.buffers.iter().filter(|buffer| buffer.is_queue).map(|buffer| buffer.bytes).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::Options;
+    use crate::scene::built_in;
+
+    #[test]
+    fn trees_of_more_nodes_than_groups_can_name_are_refused() {
+        let scene = built_in("table").unwrap();
+        let prepared = Prepared::new(&scene, &Options::default()).unwrap();
+        let plan = |nodes: u32| {
+            let tree = TreeSize { nodes: nodes as usize, ..TreeSize::default() };
+            Plan::new(&prepared, &scene, prepared.features, tree, WORKGROUP)
+        };
+        assert!(plan(MOST_NODES).is_ok());
+        let refused = plan(MOST_NODES + 1).unwrap_err();
+        assert_eq!(refused.exit_code(), 2);
+        assert!(refused.to_string().contains("8388608 nodes"), "{refused}");
     }
 }

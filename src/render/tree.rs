@@ -4,7 +4,7 @@
 //! own space, about its own centre, and an upper tree over the instances' boxes has one instance in each leaf. Every space of the
 //! device is a [`Rebase`] of one of the scene's.
 
-use crate::bvh::{quantise, reference, Aabb, Bvh, Child, Grid, Quality, WIDTH};
+use crate::bvh::{quantise, reference, Aabb, Bvh, Child, DeviceNode, Grid, Quality};
 use crate::layout::{Features, Instance, LEAF_IS_INSTANCE, NODE_TEXELS, STACK_REGISTERS};
 use crate::report;
 use crate::scene::{bounds_of, box_corners, Placement, Projection, Soup, View};
@@ -161,8 +161,8 @@ pub struct TreeSize {
 
 /// What the device gets.
 pub(super) struct DeviceTree {
-    /// WIDTH records a node; the root is node 0.
-    pub records: Vec<[u32; 4]>,
+    /// All trees' nodes; the root is node 0.
+    pub nodes: Vec<DeviceNode>,
     /// Grid of the root's tree.
     pub grid: Grid,
     /// Primitives in leaf order.
@@ -270,7 +270,7 @@ impl Tree {
     pub(super) fn for_device(&self, soup: &Soup, eye: DVec3) -> DeviceTree {
         let eye = self.rebase.exact(eye);
         let mut device = DeviceTree {
-            records: Vec::new(),
+            nodes: Vec::new(),
             grid: Grid { origin: Vec3::ZERO, scale: Vec3::ONE },
             order: Vec::with_capacity(self.size().triangles),
             instances: Vec::new(),
@@ -280,7 +280,7 @@ impl Tree {
             for part in &self.parts {
                 let quantised =
                     quantise(&part.bvh, eye.abs().as_vec3(), self.rounds_outward, |child| reference(child, 0, 0));
-                (device.records, device.grid) = (quantised.records, quantised.grid);
+                (device.nodes, device.grid) = (quantised.nodes, quantised.grid);
                 device.order.clone_from(&part.bvh.order);
             }
             // Only kernels that were told to expect instances look at it: the scene as it is.
@@ -294,7 +294,7 @@ impl Tree {
             Child::Leaf { first, .. } => !(first << 4 | LEAF_IS_INSTANCE),
         };
         let quantised = quantise(upper, eye.abs().as_vec3(), self.rounds_outward, refer);
-        (device.records, device.grid) = (quantised.records, quantised.grid);
+        (device.nodes, device.grid) = (quantised.nodes, quantised.grid);
         let transforms: Vec<Transforms> = soup
             .placements
             .par_iter()
@@ -310,7 +310,7 @@ impl Tree {
         }
         let mut lower = Vec::new();
         for ((part, range), reach) in self.parts.iter().zip(&soup.parts).zip(reach) {
-            let first_node = (device.records.len() / WIDTH) as u32;
+            let first_node = device.nodes.len() as u32;
             let first_primitive = device.order.len() as u32;
             let refer = |child| reference(child, first_node, first_primitive);
             let quantised = quantise(&part.bvh, reach.as_vec3(), self.rounds_outward, refer);
@@ -319,7 +319,7 @@ impl Tree {
                 [leaf @ Child::Leaf { .. }, Child::Leaf { count: 0, .. }] => refer(leaf),
                 _ => first_node,
             };
-            device.records.extend(quantised.records);
+            device.nodes.extend(quantised.nodes);
             device.order.extend(part.bvh.order.iter().map(|primitive| primitive + range.start as u32));
             lower.push((quantised.grid, root));
         }
