@@ -4,7 +4,7 @@ use super::frames::{exact, look, scene_of, small};
 use super::support::{assert_alike, draw, draw_reference, storage_renderer};
 use glam::{DMat4, DVec3, Vec3};
 use glimt::bvh::Quality;
-use glimt::scene::{built_in, shapes, Light, Material, Mesh};
+use glimt::scene::{built_in, shapes, Instance, Instancing, Light, Material, Mesh};
 use glimt::{Options, Scene};
 
 #[test]
@@ -39,6 +39,14 @@ fn rays_that_overflow_their_stack_are_traced_again() {
     let waves = Options { samples_in_flight: 640, samples: 3, ..options.clone() };
     assert_eq!(draw(&scene, &waves).0, draw(&scene, &Options { samples: 3, ..options.clone() }).0);
     assert_eq!(film, storage_renderer().render(&scene, &options).unwrap().0);
+    // Through instances of the needles, the way back to the nodes of the world's tree among what waits on the stack.
+    let mut many = scene.clone();
+    let moved = |x: f64| Instance { mesh: 0, world_from_object: DMat4::from_translation(DVec3::X * x) };
+    many.instances = (-8..=8).map(|place| moved(0.1 * f64::from(place))).collect();
+    let shared = Options { instancing: Instancing::Shared, ..options.clone() };
+    let (film, report) = draw(&many, &shared);
+    assert!(report.passes.iter().any(|pass| pass.name == "retrace" && pass.items > 100));
+    assert_eq!(film, draw(&many, &Options { bvh: Some(Quality::Best), ..shared }).0, "the trees' shapes never show");
     // A flat tree has no such need: the queue is left out.
     let flat = draw(&built_in("cornell").unwrap(), &small()).1;
     assert!(!flat.features["deep_tree"] && flat.passes.iter().all(|pass| pass.name != "retrace"));
