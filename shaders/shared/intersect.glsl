@@ -150,9 +150,11 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance
     bool culled = SINGLE_SIDED && !any && (texel_b.w & TRIANGLE_SINGLE_SIDED) != 0u && is_back;
     bool comes_first = INSTANCES && instance != hit.instance ? instance < hit.instance : texel_a.w < hit.primitive;
     uint precedence = texel_c.w | (is_back ? PRECEDENCE_BACK : 0u);
-    bool is_first = precedence != hit.precedence ? precedence < hit.precedence : comes_first;
+    bool is_first = precedence < hit.precedence || (precedence == hit.precedence && comes_first);
+    // What is not hit is behind the ray. Where det is 0 no distance is nearer: it is infinite or NaN.
+    t = inside ? t : -1.0;
     bool nearer = any ? t <= hit.t : t < hit.t || (t == hit.t && is_first);
-    if (inside && det != 0.0 && t > 0.0 && nearer && !culled) {
+    if (t > 0.0 && nearer && !culled) {
         vec2 barycentrics = vec2(v, w) / det;
         if (ALPHA && (texel_b.w & TRIANGLE_SEE_THROUGH) != 0u && !is_met(texel_a.w, texel_b.w, barycentrics, any, hit))
             return false;
