@@ -61,6 +61,7 @@ int key_of(GridRay ray, uvec3 box, uint place, float t_max) {
     return first > last ? MISSED : int((uint(first) & ~CODE_MASK) | IS_CHILD | place);
 }
 
+/// Two keys in their order.
 void order(inout int nearer, inout int farther) {
     int least = min(nearer, farther);
     farther = max(nearer, farther);
@@ -215,6 +216,7 @@ void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
             found = visit_leaf(walk, node, any, hit);
         }
         uint group = height > 0 && !(any && found) ? stack[height - 1] : NO_GROUP;
+        // Of no group it is NOTHING, which ends the walk.
         node = first_of(group);
         if (is_empty(rest_of(group)))
             height--;
