@@ -2,6 +2,7 @@
 
 mod metrics;
 mod read;
+mod srgb;
 mod write;
 
 pub use metrics::{compare, compare_linear, heat_map, LinearMetrics, Metrics};
@@ -29,36 +30,24 @@ impl Film {
 
     /// 8-bit sRGB of a pixel, alpha not multiplied in.
     pub fn srgb8(&self, pixel: usize) -> [u8; 4] {
-        self.srgb(pixel).map(|value| (value * 255.0 + 0.5) as u8)
+        let [r, g, b, a] = self.straight(pixel);
+        [srgb::code(r), srgb::code(g), srgb::code(b), (a * 255.0 + 0.5) as u8]
     }
 
     /// sRGB (IEC 61966-2-1) of a pixel, 0 to 1, alpha not multiplied in.
     pub fn srgb(&self, pixel: usize) -> [f32; 4] {
+        let [r, g, b, a] = self.straight(pixel);
+        [srgb::encode(r), srgb::encode(g), srgb::encode(b), a]
+    }
+
+    /// A pixel, still linear, alpha not multiplied in and from 0 to 1.
+    fn straight(&self, pixel: usize) -> [f32; 4] {
         let [r, g, b, a] = self.pixels[pixel];
         if !self.has_alpha {
-            return [encode(r), encode(g), encode(b), 1.0];
+            return [r, g, b, 1.0];
         }
-        let straight = |value: f32| if a > 0.0 { encode(value / a) } else { 0.0 };
+        let straight = |value: f32| if a > 0.0 { value / a } else { 0.0 };
         [straight(r), straight(g), straight(b), a.clamp(0.0, 1.0)]
-    }
-}
-
-/// Linear to sRGB; out of range is clamped, NaN becomes 0.
-fn encode(linear: f32) -> f32 {
-    let linear = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
-    if linear <= 0.003_130_8 {
-        linear * 12.92
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
-}
-
-/// sRGB to linear.
-fn decode(srgb: f32) -> f32 {
-    if srgb <= 0.04045 {
-        srgb / 12.92
-    } else {
-        ((srgb + 0.055) / 1.055).powf(2.4)
     }
 }
 
@@ -69,15 +58,9 @@ mod tests {
     #[test]
     fn every_8_bit_color_survives_being_linear() {
         for value in 0..=255_u8 {
-            let linear = decode(f32::from(value) / 255.0);
+            let linear = srgb::decode(f64::from(value) / 255.0) as f32;
             let film = Film { width: 1, height: 1, pixels: vec![[linear, linear, linear, 1.0]], has_alpha: false };
             assert_eq!(film.srgb8(0), [value, value, value, 255]);
         }
-    }
-
-    #[test]
-    fn not_a_number_and_out_of_range_are_tamed() {
-        let pixels = vec![[f32::NAN, -1.0, f32::INFINITY, 1.0]];
-        assert_eq!(Film { width: 1, height: 1, pixels, has_alpha: false }.srgb8(0), [0, 0, 255, 255]);
     }
 }

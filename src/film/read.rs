@@ -1,6 +1,6 @@
 //! File → film.
 
-use super::{decode, Film};
+use super::{srgb::decode, Film};
 use crate::error::{Error, Result};
 use image::{DynamicImage, ImageReader};
 use std::path::Path;
@@ -24,7 +24,8 @@ pub fn read(path: &Path) -> Result<Film> {
         if linear {
             [r, g, b, a]
         } else {
-            [decode(r) * a, decode(g) * a, decode(b) * a, a]
+            let linear = |value: f32| decode(value.into()) as f32 * a;
+            [linear(r), linear(g), linear(b), a]
         }
     };
     Ok(Film { width, height, pixels: image.pixels().map(pixel).collect(), has_alpha })
