@@ -1,9 +1,11 @@
 //! Pictures of scenes that are hard on trees, stacks and f32.
 
 use super::frames::{exact, look, scene_of, small};
-use super::support::{assert_alike, draw, draw_reference, storage_renderer};
+use super::support::{assert_alike, draw, draw_reference, renderer, storage_renderer};
 use glam::{DMat4, DVec3, Vec3};
 use glimt::bvh::Quality;
+use glimt::render::ray_sets::SetKind;
+use glimt::render::{Met, Prepared, Ray};
 use glimt::scene::{built_in, shapes, Instance, Instancing, Light, Material, Mesh};
 use glimt::{Options, Scene};
 
@@ -84,6 +86,38 @@ fn the_order_of_the_file_does_not_decide_between_copies() {
     };
     let first = picture(&[0, 1, 2, 3, 4]);
     assert!([[4, 3, 2, 1, 0], [2, 0, 4, 1, 3]].iter().all(|order| picture(order) == first));
+}
+
+#[test]
+fn of_equal_triangles_the_first_of_the_file_is_met() {
+    // Leaves have them in whatever order the tree likes.
+    let different = 97;
+    let mut mesh = Mesh::default();
+    for index in 0..3 * different {
+        let shift = |step: f32| ((index % different) as f32 * step).fract() - 0.5;
+        mesh.triangles.push([0, 1, 2].map(|corner| 3 * index + corner));
+        let corners = [(-0.9, -0.8), (0.9, -0.8), (0.0, 0.9)];
+        mesh.positions
+            .extend(corners.map(|(x, y)| Vec3::new(x + shift(0.618_034), y + shift(0.754_878), x * shift(0.569_84))));
+    }
+    let scene = scene_of(vec![(mesh, DMat4::IDENTITY, exact(0.2, 0.5, 0.2, 20.0, 0.3))], Vec::new());
+    let eye = DVec3::new(0.1, 0.2, 2.0);
+    let ray = |index: u32| {
+        let aim = DVec3::new(f64::from(index % 32) / 32.0 - 0.5, f64::from(index / 32) / 32.0 - 0.5, 0.0);
+        Ray { origin: eye, direction: (aim - eye).as_vec3().as_dvec3(), t_max: f64::MAX }
+    };
+    let rays: Vec<Ray> = (0..1024).map(ray).collect();
+    for quality in [Quality::Fast, Quality::Balanced, Quality::Best] {
+        let options = Options { bvh: Some(quality), camera: look(eye, DVec3::ZERO), size: (32, 32), ..small() };
+        let prepared = Prepared::new(&scene, &options).unwrap();
+        let tree = prepared.tree(&options);
+        let mut tracer = renderer().tracer(&scene, &prepared, &tree).unwrap();
+        let met = tracer.trace(SetKind::Diffuse, &rays, 1, &options).unwrap().met;
+        let is_first = |met: &&Met| matches!(met, Met::Triangle { primitive, .. } if *primitive < different);
+        let (first, none) =
+            (met.iter().filter(is_first).count(), met.iter().filter(|met| **met == Met::Nothing).count());
+        assert!(none < 512 && first + none == 1024, "{quality:?}: {first} of {} hits", 1024 - none);
+    }
 }
 
 #[test]
