@@ -31,8 +31,8 @@ pub(super) struct Frame<'a> {
     pub bindings: Bindings,
     /// By slot; views have none of their own.
     buffers: BTreeMap<u32, Buffer>,
-    /// Where the host reads: the counters of a wave, then the film of a band.
-    read_back: Buffer,
+    /// Where the host reads: the counters of a wave, then the film of a band. Bands take turns where there are several.
+    read_back: Vec<Buffer>,
     totals: Totals,
 }
 
@@ -76,7 +76,9 @@ impl<'a> Frame<'a> {
         let (kernels, buffers) = (kernels?, buffers?);
         let bindings = bind(renderer, &buffers)?;
         let read_back = COUNTER_BYTES as u64 + u64::from(plan.band_pixels) * PIXEL_BYTES as u64;
-        let read_back = Buffer::new(&renderer.device, "read back", read_back, Usage::Storage, Memory::ReadBack)?;
+        let read_back = (0..plan.bands().min(2))
+            .map(|_| Buffer::new(&renderer.device, "read back", read_back, Usage::Storage, Memory::ReadBack))
+            .collect::<Result<_>>()?;
         Ok(Self {
             renderer,
             view,
@@ -150,10 +152,11 @@ impl<'a> Frame<'a> {
         commands.dispatch(&self.kernels.resolve, bytemuck::bytes_of(&resolved), wave.pixels.div_ceil(WORKGROUP));
         // Film and counters: kernels wrote, copies read.
         commands.barrier(Access::ShaderWrite, Access::Transfer);
-        commands.copy(self.buffer(binding::COUNTERS), &self.read_back, 0, COUNTER_BYTES as u64);
+        let read_back = self.read_back(wave.first_pixel.into());
+        commands.copy(self.buffer(binding::COUNTERS), read_back, 0, COUNTER_BYTES as u64);
         if wave.finish != 0 {
             let bytes = u64::from(wave.pixels) * PIXEL_BYTES as u64;
-            commands.copy(self.buffer(binding::FILM), &self.read_back, COUNTER_BYTES as u64, bytes);
+            commands.copy(self.buffer(binding::FILM), read_back, COUNTER_BYTES as u64, bytes);
         }
         // What was read back: copies wrote, the host reads.
         commands.barrier(Access::Transfer, Access::HostRead);
@@ -228,6 +231,7 @@ impl<'a> Frame<'a> {
         let Plan { padded_pixels, band_pixels, wave_samples, .. } = self.plan;
         let mut film = Film::new(self.view.width, self.view.height, self.view.background == Background::Transparent);
         let count = samples.end - samples.start;
+        let mut finished = None;
         for first_pixel in (0..padded_pixels).step_by(band_pixels as usize) {
             let pixels = u64::from(band_pixels).min(padded_pixels - first_pixel) as u32;
             for first_sample in samples.clone().step_by(wave_samples as usize) {
@@ -242,15 +246,18 @@ impl<'a> Frame<'a> {
                     start: samples.start,
                     ..Step::default()
                 };
-                while !self.run_wave(wave, options)? {}
+                // While the device works on this band, the host takes the one before.
+                let mut collect = |frame: &Self| finished.take().map_or(Ok(()), |band| frame.collect(&mut film, band));
+                while !self.run_wave(wave, options, &mut collect)? {}
                 if let Some(progress) = &options.progress {
                     let done = first_sample + in_wave - samples.start;
                     let done = first_pixel * u64::from(count) + u64::from(pixels) * u64::from(done);
                     progress(done, padded_pixels * u64::from(count));
                 }
             }
-            self.collect(&mut film, first_pixel, pixels)?;
+            finished = Some((first_pixel, pixels));
         }
+        finished.map_or(Ok(()), |band| self.collect(&mut film, band))?;
         self.totals.samples += u64::from(count);
         self.totals.waves += u64::from(count.div_ceil(wave_samples));
         Ok(film)
@@ -261,8 +268,19 @@ impl<'a> Frame<'a> {
         self.totals.outcome(self.view, &self.plan)
     }
 
-    /// Runs one wave; false when it must be run once more.
-    fn run_wave(&mut self, wave: Step, options: &Options) -> Result<bool> {
+    /// Where the band that begins with this pixel is read.
+    fn read_back(&self, first_pixel: u64) -> &Buffer {
+        let band = first_pixel / u64::from(self.plan.band_pixels);
+        &self.read_back[band as usize % self.read_back.len()]
+    }
+
+    /// Runs one wave, and `host_work` beside it; false when it must be run once more.
+    fn run_wave(
+        &mut self,
+        wave: Step,
+        options: &Options,
+        host_work: &mut impl FnMut(&Self) -> Result<()>,
+    ) -> Result<bool> {
         if options.interrupted.load(Ordering::Relaxed) {
             return Err(Error::Interrupted);
         }
@@ -271,10 +289,14 @@ impl<'a> Frame<'a> {
         let timed = dispatches * (1 + again);
         let mut commands = Commands::new(&self.renderer.device, timed.min(MOST_TIMED) as usize)?;
         self.record(&mut commands, wave);
-        let times = commands.submit_and_wait()?;
+        let mut worked = Ok(());
+        let times = commands.submit_and_wait_beside(|| worked = host_work(self))?;
+        worked?;
         self.totals.add_times(&times);
         let mut counters = [0; COUNTERS as usize];
-        counters.copy_from_slice(bytemuck::cast_slice(&self.read_back.read()?[..4 * COUNTERS as usize]));
+        counters.copy_from_slice(bytemuck::cast_slice(
+            &self.read_back(wave.first_pixel.into()).read()?[..4 * COUNTERS as usize],
+        ));
         if self.must_run_again(&counters)? {
             return Ok(false);
         }
@@ -282,9 +304,9 @@ impl<'a> Frame<'a> {
         Ok(true)
     }
 
-    /// Copies a band from tile order to the rows of the film.
-    fn collect(&self, film: &mut Film, first_pixel: u64, pixels: u32) -> Result<()> {
-        let bytes = &self.read_back.read()?[COUNTER_BYTES..][..pixels as usize * PIXEL_BYTES];
+    /// Copies a band, its first pixel and how many it has, from tile order to the rows of the film.
+    fn collect(&self, film: &mut Film, (first_pixel, pixels): (u64, u32)) -> Result<()> {
+        let bytes = &self.read_back(first_pixel).read()?[COUNTER_BYTES..][..pixels as usize * PIXEL_BYTES];
         let band: &[[f32; 4]] = bytemuck::cast_slice(bytes);
         let (side, across) = (TILE as usize, self.view.width.div_ceil(TILE) as usize);
         let (width, height) = (self.view.width as usize, self.view.height as usize);

@@ -130,7 +130,8 @@ impl Plan {
         self.passes.iter().map(|pass| pass.dispatches).sum::<u64>() / self.waves(samples)
     }
 
-    fn bands(&self) -> u64 {
+    /// Bands that the picture is made in.
+    pub(super) fn bands(&self) -> u64 {
         self.padded_pixels.div_ceil(u64::from(self.band_pixels))
     }
 

@@ -198,7 +198,7 @@ impl Buffer {
         target.ok_or_else(|| Error::Device(format!("cannot write {bytes} bytes to {}", self.name)))
     }
 
-    /// The host's view of the whole buffer.
+    /// The host's view of the whole buffer, which no commands in flight may write.
     ///
     /// # Errors
     /// `Device` when the buffer is not in host-visible memory.

@@ -57,6 +57,7 @@ pub struct Commands {
     /// Name of each dispatch; the end timestamp of the first `most_timed` has the next index.
     dispatched: Vec<&'static str>,
     most_timed: usize,
+    is_submitted: bool,
 }
 
 impl Commands {
@@ -75,6 +76,7 @@ impl Commands {
             timestamps: vk::QueryPool::null(),
             dispatched: Vec::new(),
             most_timed,
+            is_submitted: false,
         };
         let raw = &device.raw;
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(device.queue_family);
@@ -194,6 +196,14 @@ impl Commands {
     /// # Errors
     /// `Vulkan` when the device is lost or out of memory.
     pub fn submit_and_wait(self) -> Result<Vec<(&'static str, f64)>> {
+        self.submit_and_wait_beside(|| ())
+    }
+
+    /// The same; the host does its own work before it waits.
+    ///
+    /// # Errors
+    /// As [`Self::submit_and_wait`].
+    pub fn submit_and_wait_beside(mut self, host_work: impl FnOnce()) -> Result<Vec<(&'static str, f64)>> {
         let raw = &self.device.raw;
         // SAFETY: recording, and ended once.
         unsafe { raw.end_command_buffer(self.buffer) }.map_err(failed("end commands"))?;
@@ -204,9 +214,15 @@ impl Commands {
             // SAFETY: the lock keeps other threads off the queue; fence and commands are fresh.
             unsafe { raw.queue_submit(*queue, &submit, self.fence) }.map_err(failed("submit"))?;
         }
-        // SAFETY: the fence was just submitted.
-        unsafe { raw.wait_for_fences(&[self.fence], true, u64::MAX) }.map_err(failed("wait for the device"))?;
+        self.is_submitted = true;
+        host_work();
+        self.wait()?;
         self.read_timestamps()
+    }
+
+    fn wait(&self) -> Result<()> {
+        // SAFETY: the fence was submitted.
+        unsafe { self.device.raw.wait_for_fences(&[self.fence], true, u64::MAX) }.map_err(failed("wait for the device"))
     }
 
     fn read_timestamps(&self) -> Result<Vec<(&'static str, f64)>> {
@@ -228,6 +244,10 @@ impl Commands {
 
 impl Drop for Commands {
     fn drop(&mut self) {
+        if self.is_submitted {
+            // Again, in case the host's work panicked. A lost device does not use them any more.
+            let _ = self.wait();
+        }
         let raw = &self.device.raw;
         // SAFETY: submitted commands were waited for, or were never submitted; null is allowed here and below.
         unsafe { raw.destroy_query_pool(self.timestamps, None) };
