@@ -40,7 +40,7 @@ impl Film {
         [srgb::encode(r), srgb::encode(g), srgb::encode(b), a]
     }
 
-    /// A pixel, still linear, alpha not multiplied in and from 0 to 1.
+    /// A pixel, still linear; alpha, which is 0 to 1, not multiplied in.
     fn straight(&self, pixel: usize) -> [f32; 4] {
         let [r, g, b, a] = self.pixels[pixel];
         if !self.has_alpha {

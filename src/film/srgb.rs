@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 /// Light below this has code 0.
 const LEAST: f32 = 1.0 / 8192.0;
-/// Bits of a float that are the same all over a slot: sign, exponent and seven of the fraction. So many that no slot has two borders.
+/// Low bits of a float that differ within a slot. The exponent and seven bits of the fraction are the same: short enough for one border at most.
 const SLOT_SHIFT: u32 = 16;
 
 /// A short range of light: where in it the code goes up by one, if it does.
