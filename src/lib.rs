@@ -24,8 +24,8 @@
 //! ```text
 //! main → cli → everything below       render → scene, bvh, vulkan, layout, film, report, error
 //! stress, study → render, scene, film, report, error (stress also reference and layout, study bvh)
-//! reference → scene, film, error      scene → error, layout (features only)       bvh → layout, error
-//! vulkan → error      film → error      layout, report, error → nothing
+//! reference → scene, film, error      scene → error, srgb, layout (features only)       bvh → layout, error
+//! vulkan → error      film → error, srgb      layout, report, error, srgb → nothing
 //! ```
 //! All `unsafe` lives in [`vulkan`]. What host and device share is declared once, in `shaders/shared/`, see [`layout`].
 
@@ -37,6 +37,7 @@ pub mod reference;
 pub mod render;
 pub mod report;
 pub mod scene;
+mod srgb;
 pub mod stress;
 pub mod study;
 pub mod vulkan;

@@ -31,19 +31,20 @@ fn code(path: &Path) -> String {
 }
 
 /// Room → rooms it may name.
-const ARROWS: [(&str, &[&str]); 12] = [
+const ARROWS: [(&str, &[&str]); 13] = [
     ("main.rs", &["cli"]),
     ("cli", &["render", "scene", "film", "report", "reference", "stress", "study", "bvh", "vulkan", "error"]),
     ("study", &["render", "scene", "film", "report", "bvh", "error"]),
     ("stress", &["render", "scene", "reference", "film", "report", "layout", "error"]),
     ("render", &["scene", "bvh", "vulkan", "layout", "film", "report", "error"]),
     ("reference", &["scene", "film", "error"]),
-    ("scene", &["error", "layout"]),
+    ("scene", &["error", "layout", "srgb"]),
     ("bvh", &["layout", "error"]),
     ("vulkan", &["error"]),
-    ("film", &["error"]),
+    ("film", &["error", "srgb"]),
     ("layout", &[]),
     ("report", &[]),
+    ("srgb.rs", &[]),
 ];
 
 /// Rooms that a file names as `crate::room` or, in the program, as `glimt::room`.

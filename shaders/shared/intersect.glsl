@@ -161,7 +161,7 @@ bool intersect_triangle(ShearedRay ray, uint triangle, uint first, uint instance
         if (any)
             hit.triangle = triangle;
         else
-            hit = Hit(t, triangle, texel_a.w, barycentrics, instance, precedence, hit.passed);
+            hit = Hit(t, triangle, texel_a.w, barycentrics, INSTANCES ? instance : hit.instance, precedence, hit.passed);
         return true;
     }
     return false;

@@ -2,12 +2,13 @@
 
 mod metrics;
 mod read;
-mod srgb;
 mod write;
 
 pub use metrics::{compare, compare_linear, heat_map, LinearMetrics, Metrics};
 pub use read::read;
 pub use write::{check_writable, write_whole, Format, Saved};
+
+use crate::srgb;
 
 /// Linear pixels, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +38,8 @@ impl Film {
     /// sRGB (IEC 61966-2-1) of a pixel, 0 to 1, alpha not multiplied in.
     pub fn srgb(&self, pixel: usize) -> [f32; 4] {
         let [r, g, b, a] = self.straight(pixel);
-        [srgb::encode(r), srgb::encode(g), srgb::encode(b), a]
+        let encode = |light: f32| srgb::encode(light.into()) as f32;
+        [encode(r), encode(g), encode(b), a]
     }
 
     /// A pixel, still linear; alpha, which is 0 to 1, not multiplied in.

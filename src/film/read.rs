@@ -1,7 +1,8 @@
 //! File → film.
 
-use super::{srgb::decode, Film};
+use super::Film;
 use crate::error::{Error, Result};
+use crate::srgb::decode;
 use image::{DynamicImage, ImageReader};
 use std::path::Path;
 

@@ -1,6 +1,7 @@
 //! What a ray that hits nothing sees.
 
 use crate::error::{Error, Result};
+use crate::srgb::decode;
 use glam::DVec3;
 use std::str::FromStr;
 
@@ -48,7 +49,7 @@ impl Background {
 
 /// Linear value of an 8-bit sRGB one.
 fn linear(code: u8) -> f64 {
-    super::srgb::decode(f64::from(code) / 255.0)
+    decode(f64::from(code) / 255.0)
 }
 
 impl FromStr for Background {

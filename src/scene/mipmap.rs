@@ -1,6 +1,7 @@
 //! Mipmaps: a picture, then the same half as wide and high, down to one pixel.
 
-use super::{srgb, Image, Pixels};
+use super::{Image, Pixels};
+use crate::srgb;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -15,7 +16,6 @@ impl<'a> Mipmaps<'a> {
     /// The levels of a picture: the mean of the pixels that each covers, by area. Colours in sRGB are averaged as the light that they stand for.
     pub fn of(image: &'a Image, is_srgb: bool) -> Self {
         let light: Vec<f32> = (0..=255_u8).map(|value| decode(f32::from(value) / 255.0, is_srgb)).collect();
-        let codes = codes(is_srgb);
         let mut levels = Self::whole(image).levels;
         while let Some((width, height, pixels)) = levels.last().filter(|(width, height, _)| *width > 1 || *height > 1) {
             let size = (*width, *height);
@@ -25,8 +25,9 @@ impl<'a> Mipmaps<'a> {
                         [light[r as usize], light[g as usize], light[b as usize], f32::from(a) / 255.0]
                     };
                     Pixels::Rgba8(halved(size, pixels, decoded, |[r, g, b, a]| {
-                        let code = |light: f32| codes[(light * LIGHTS).round().min(LIGHTS) as usize];
-                        [code(r), code(g), code(b), (255.0 * a).round() as u8]
+                        let plain = |value: f32| (255.0 * value).round() as u8;
+                        let code = |light: f32| if is_srgb { srgb::code(light) } else { plain(light) };
+                        [code(r), code(g), code(b), plain(a)]
                     }))
                 }
                 Pixels::Rgba16(pixels) => {
@@ -86,15 +87,6 @@ fn halved<T: Copy + Send + Sync>(
         })
     };
     (0..down).into_par_iter().flat_map_iter(row).collect()
-}
-
-/// Steps of light that have a code in a table: so many that the steepest part of sRGB needs twenty for one.
-const LIGHTS: f32 = 65535.0;
-
-/// The 8 bit codes of all steps of light: a power for every pixel takes ten times as long.
-fn codes(is_srgb: bool) -> Vec<u8> {
-    let code = |step: u16| encoded([f32::from(step) / LIGHTS, 0.0, 0.0, 0.0], is_srgb)[0];
-    (0..=u16::MAX).map(|step| (255.0 * code(step)).round() as u8).collect()
 }
 
 /// Light of a channel, both 0 to 1.

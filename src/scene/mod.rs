@@ -26,7 +26,6 @@ mod sampling;
 pub mod shapes;
 mod sharing;
 mod soup;
-mod srgb;
 mod tangents;
 mod teapot;
 mod texture;

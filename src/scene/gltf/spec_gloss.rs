@@ -3,8 +3,8 @@
 
 use super::materials::Properties;
 use super::Document;
-use crate::scene::srgb::{decode, encode};
 use crate::scene::{Image, Map, Material, Pixels, Scene, Texture};
+use crate::srgb::{decode, encode};
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 use std::sync::Arc;

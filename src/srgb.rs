@@ -1,4 +1,5 @@
-//! sRGB's transfer function (IEC 61966-2-1), both ways, and its 8-bit codes without a power for each.
+//! sRGB's transfer function (IEC 61966-2-1), both ways, and its 8-bit codes without a power for each: of pictures that are read, of those that are
+//! written, and of mipmaps between.
 
 use std::sync::LazyLock;
 
@@ -30,7 +31,7 @@ static SLOTS: LazyLock<Vec<Slot>> = LazyLock::new(|| {
 });
 
 /// The 8-bit code of light, rounded to the nearest; out of range is clamped, NaN becomes 0.
-pub(super) fn code(light: f32) -> u8 {
+pub fn code(light: f32) -> u8 {
     // NaN is not more than anything.
     let light = if light > LEAST { light.min(1.0) } else { LEAST };
     let slot = SLOTS[slot_of(light)];
@@ -53,18 +54,18 @@ fn border(code: u8) -> f32 {
     }
 }
 
-/// Linear to sRGB; out of range is clamped, NaN becomes 0.
-pub(super) fn encode(light: f32) -> f32 {
+/// Linear to sRGB, both 0 to 1; out of range is clamped, NaN becomes 0.
+pub fn encode(light: f64) -> f64 {
     let light = if light > 0.0 { light.min(1.0) } else { 0.0 };
     if light <= 0.003_130_8 {
-        light * 12.92
+        12.92 * light
     } else {
         1.055 * light.powf(1.0 / 2.4) - 0.055
     }
 }
 
 /// sRGB to linear, both 0 to 1.
-pub(super) fn decode(srgb: f64) -> f64 {
+pub fn decode(srgb: f64) -> f64 {
     if srgb <= 0.04045 {
         srgb / 12.92
     } else {
@@ -78,9 +79,7 @@ mod tests {
 
     /// By the formula; `border` goes the other way.
     fn exact(light: f32) -> u8 {
-        let light = f64::from(light);
-        let srgb = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
-        (255.0 * srgb + 0.5) as u8
+        (255.0 * encode(light.into()) + 0.5) as u8
     }
 
     #[test]
@@ -110,5 +109,9 @@ mod tests {
     #[test]
     fn not_a_number_and_out_of_range_are_tamed() {
         assert_eq!([f32::NAN, -1.0, 0.0, f32::INFINITY, 2.0].map(code), [0, 0, 0, 255, 255]);
+        assert_eq!(
+            [f64::NAN, -1.0, 0.0, f64::INFINITY, 2.0].map(|light| encode(light) as f32),
+            [0.0, 0.0, 0.0, 1.0, 1.0]
+        );
     }
 }
