@@ -7,6 +7,7 @@
 use super::Film;
 use crate::error::{Error, Result};
 use image::RgbImage;
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// Distances between two pictures; 0 means equal, except for `psnr` (infinite, `null` in JSON) and `ssim` (1).
@@ -65,11 +66,12 @@ fn shown(film: &Film) -> Vec<[f32; 3]> {
         let [r, g, b, a] = film.srgb(index);
         [r * a, g * a, b * a]
     };
-    (0..film.pixels.len()).map(pixel).collect()
+    (0..film.pixels.len()).into_par_iter().map(pixel).collect()
 }
 
-fn rgb8(film: &Film) -> RgbImage {
-    let bytes: Vec<u8> = shown(film).into_iter().flatten().map(|value| (value * 255.0 + 0.5) as u8).collect();
+/// The same in 8 bits.
+fn rgb8(film: &Film, shown: &[[f32; 3]]) -> RgbImage {
+    let bytes = shown.as_flattened().iter().map(|value| (value * 255.0 + 0.5) as u8).collect();
     RgbImage::from_raw(film.width, film.height, bytes).unwrap_or_default()
 }
 
@@ -81,8 +83,8 @@ fn same_size(a: &Film, b: &Film) -> Result<()> {
 }
 
 /// FLIP error of every pixel, 0 to 1.
-fn flip_map(reference: &Film, test: &Film) -> Vec<f32> {
-    let flip = |film: &Film| nv_flip::FlipImageRgb8::with_data(film.width, film.height, rgb8(film).as_raw());
+fn flip_map(reference: &RgbImage, test: &RgbImage) -> Vec<f32> {
+    let flip = |image: &RgbImage| nv_flip::FlipImageRgb8::with_data(image.width(), image.height(), image.as_raw());
     nv_flip::flip(flip(reference), flip(test), nv_flip::DEFAULT_PIXELS_PER_DEGREE).to_vec()
 }
 
@@ -93,7 +95,8 @@ fn flip_map(reference: &Film, test: &Film) -> Vec<f32> {
 pub fn compare(reference: &Film, test: &Film) -> Result<Metrics> {
     same_size(reference, test)?;
     let (mut squares, mut max, mut over) = (0.0_f64, 0.0_f64, 0_usize);
-    for (a, b) in shown(reference).iter().zip(shown(test)) {
+    let (shown_reference, shown_test) = (shown(reference), shown(test));
+    for (a, b) in shown_reference.iter().zip(&shown_test) {
         let differences = [0, 1, 2].map(|channel| f64::from(a[channel] - b[channel]).abs());
         let largest = differences.into_iter().fold(0.0, f64::max);
         squares += differences.iter().map(|difference| difference * difference).sum::<f64>();
@@ -103,10 +106,11 @@ pub fn compare(reference: &Film, test: &Film) -> Result<Metrics> {
     }
     let pixels = reference.pixels.len() as f64;
     let rmse = (squares / (3.0 * pixels)).sqrt();
+    let (image, test_image) = (rgb8(reference, &shown_reference), rgb8(test, &shown_test));
     let similarity =
-        image_compare::rgb_similarity_structure(&image_compare::Algorithm::MSSIMSimple, &rgb8(reference), &rgb8(test))
+        image_compare::rgb_similarity_structure(&image_compare::Algorithm::MSSIMSimple, &image, &test_image)
             .map_err(|error| Error::Usage(format!("structural similarity: {error}")))?;
-    let flip = flip_map(reference, test);
+    let flip = flip_map(&image, &test_image);
     Ok(Metrics {
         rmse,
         psnr: -20.0 * rmse.log10(),
@@ -128,6 +132,7 @@ pub fn heat_map(reference: &Film, test: &Film) -> Result<Film> {
         let ramp = |from: f32| ((error - from) * 3.0).clamp(0.0, 1.0);
         [ramp(0.0), ramp(1.0 / 3.0), ramp(2.0 / 3.0), 1.0]
     };
-    let pixels = flip_map(reference, test).into_iter().map(color).collect();
+    let image = |film: &Film| rgb8(film, &shown(film));
+    let pixels = flip_map(&image(reference), &image(test)).into_iter().map(color).collect();
     Ok(Film { width: reference.width, height: reference.height, pixels, has_alpha: false })
 }

@@ -4,6 +4,7 @@ use super::Film;
 use crate::error::{Error, Result};
 use crate::srgb::decode;
 use image::{DynamicImage, ImageReader};
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Reads PNG, WebP, OpenEXR or Radiance HDR; what it is, its content says.
@@ -20,8 +21,7 @@ pub fn read(path: &Path) -> Result<Film> {
     let image = image.into_rgba32f();
     let (width, height) = image.dimensions();
     // EXR stores colour times alpha, like the film; PNG and WebP do not.
-    let pixel = |pixel: &image::Rgba<f32>| {
-        let [r, g, b, a] = pixel.0;
+    let pixel = |&[r, g, b, a]: &[f32; 4]| {
         if linear {
             [r, g, b, a]
         } else {
@@ -29,5 +29,6 @@ pub fn read(path: &Path) -> Result<Film> {
             [linear(r), linear(g), linear(b), a]
         }
     };
-    Ok(Film { width, height, pixels: image.pixels().map(pixel).collect(), has_alpha })
+    let pixels = image.into_raw().as_chunks().0.par_iter().map(pixel).collect();
+    Ok(Film { width, height, pixels, has_alpha })
 }
