@@ -21,6 +21,7 @@
 //! * `batch` — JSON jobs in, answers and pictures out, in one process: order, faults, limits, line by line
 //! * `test_models` — models that show whether they are drawn right, against what they looked like
 //! * `broken` — the validator's broken files, what the fuzzer found, random changes: an error or a scene, never a panic
+//! * `vulkan` — commands that are in flight when the host panics
 //! * `corpus` — real files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
@@ -50,3 +51,4 @@ mod study;
 mod support;
 mod test_models;
 mod textures;
+mod vulkan;
