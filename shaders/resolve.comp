@@ -6,7 +6,7 @@
 
 /// One thread a pixel of the band: its samples of this wave are added to the film in their order, whatever the size of
 /// the waves, so that the sum is always the same; at the end it becomes the mean. Sums are compensated (Kahan, CACM 8(1) 1965): a million
-/// samples lose no more than one. Alpha and weights are whole numbers, which lose nothing.
+/// samples lose no more than one. Weights are whole numbers, which lose nothing, and so is alpha, unless something is blended with a transparent background.
 void main() {
     begin();
     uint pixel = gl_GlobalInvocationID.x;

@@ -24,7 +24,7 @@
 //! ```text
 //! main → cli → everything below       render → scene, bvh, vulkan, layout, film, report, error
 //! stress, study → render, scene, film, report, error (stress also reference and layout, study bvh)
-//! reference → scene, film, error      scene → error, srgb, layout (features only)       bvh → layout, error
+//! reference → scene, film, error      scene → error, srgb, layout (features, constants)       bvh → layout, error
 //! vulkan → error      film → error, srgb      layout, report, error, srgb → nothing
 //! ```
 //! All `unsafe` lives in [`vulkan`]. What host and device share is declared once, in `shaders/shared/`, see [`layout`].

@@ -24,7 +24,7 @@
 
 /// Tree: NODE_TEXELS a node: its four children's boxes on the grid (src/bvh/quantise.rs) along x, along y, along z, and their references.
 FETCH_BUFFER(0, nodes)
-/// Triangles in leaf order: three positions as float bits; w = primitive, material, TRIANGLE_ flags.
+/// Triangles in leaf order: three positions as float bits; w = primitive; material and TRIANGLE_ flags; precedence.
 FETCH_BUFFER(1, triangles)
 /// By primitive, as float bits: three vertex normals; from frame.first_color on three linear RGBA colours; from frame.first_texcoord on two
 /// sets of texture coordinates at three corners; from frame.first_tangent on three tangents, w = sign of the bitangent.

@@ -71,7 +71,7 @@ struct Step {
     uint light;
     /// shade: 1 when this dispatch adds what needs no light (the first light's).
     uint first_light;
-    /// shade: 1 when this dispatch makes rays that go on (the last light's, while there is another round).
+    /// shade: 1 when this dispatch makes rays that go on (the last light's, while there is another round, with layers in the last one, too).
     uint reflect;
     /// prepare: bit q set = queue q has been filled and is to be worked on.
     uint queues;

@@ -23,8 +23,8 @@ const REFUSED: [(&str, &str); 7] = [
 /// Limits of a job that says nothing else.
 #[derive(clap::Args, Default)]
 pub struct LimitArgs {
-    /// Stop a job after so many seconds: its file is not written. Looked at between steps of loading and between the dispatches
-    /// of a picture, none of which is interrupted [key of a job: timeout]
+    /// Stop a job after so many seconds: its file is not written. Looked at between steps of loading and between the waves of
+    /// samples of a picture, none of which is interrupted [key of a job: timeout]
     #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
     timeout: Option<Duration>,
     /// Memory that reading a job's file may take: bytes, or with K, M or G [default: 2G] [key of a job: max-memory]
