@@ -6,7 +6,7 @@
 
 /// One thread a pixel of the band: its samples of this wave are added to the film in their order, whatever the size of
 /// the waves, so that the sum is always the same; at the end it becomes the mean. Sums are compensated (Kahan, CACM 8(1) 1965): a million
-/// samples lose no more than one. Weights are whole numbers, which lose nothing, and so is alpha, unless something is blended with a transparent background.
+/// samples lose no more than one. Weights are whole numbers, which lose nothing, and so is alpha as long as nothing is blended.
 void main() {
     begin();
     uint pixel = gl_GlobalInvocationID.x;
@@ -23,9 +23,11 @@ void main() {
     }
     bvec4 fresh = bvec4(step_now.first_sample == step_now.start);
     vec4 sum = mix(FETCH_FLOATS(film_so_far, pixel), vec4(0.0), fresh);
-    vec4 rest_and_weight = mix(FETCH_FLOATS(film_rest_so_far, pixel), vec4(0.0), fresh);
-    vec3 rest = rest_and_weight.rgb;
-    float weights = rest_and_weight.w;
+    uint rest_texel = pixel * (LAYERS ? 2u : 1u);
+    vec4 rest_and_weights = mix(FETCH_FLOATS(film_rest_so_far, rest_texel), vec4(0.0), fresh);
+    float rest_of_alpha = LAYERS ? mix(FETCH_FLOATS(film_rest_so_far, rest_texel + 1u).x, 0.0, fresh.x) : 0.0;
+    vec4 rest = vec4(rest_and_weights.rgb, rest_of_alpha);
+    float weights = rest_and_weights.w;
     // A bound of this thread, not of the dispatch: see kernel.glsl.
     uint samples = min(step_now.samples, ~pixel);
     for (uint i = 0u; i < samples; i++) {
@@ -37,16 +39,18 @@ void main() {
         }
         value *= weight;
         weights += weight;
-        precise vec3 lost = PLAIN_SUMS ? vec3(0.0) : rest;
-        precise vec3 added = value.rgb - lost;
-        precise vec3 grown = sum.rgb + added;
-        precise vec3 gained = grown - sum.rgb;
+        precise vec4 lost = PLAIN_SUMS ? vec4(0.0) : rest;
+        precise vec4 added = value - lost;
+        precise vec4 grown = sum + added;
+        precise vec4 gained = grown - sum;
         rest = gained - added;
-        sum = vec4(grown, sum.a + value.a);
+        sum = grown;
     }
     // Few samples of a filter with negative parts may cancel out: then the expected sum of weights stands for the true one.
     float count = float(step_now.first_sample - step_now.start + step_now.samples);
     float divisor = weights > 0.5 * count * frame.filter_mean ? weights : count * frame.filter_mean;
     film[pixel] = sum / (step_now.finish != 0u ? divisor : 1.0);
-    film_rest[pixel] = vec4(rest, weights);
+    film_rest[rest_texel] = vec4(rest.rgb, weights);
+    if (LAYERS)
+        film_rest[rest_texel + 1u] = vec4(rest.a);
 }

@@ -184,6 +184,9 @@ fn the_picture_behind_a_link_is_replaced_not_the_link() {
     assert!(run(folder.path(), &tiny(&["-o", "link.png"])).status.success());
     assert!(folder.path().join("link.png").is_symlink());
     assert!(std::fs::read(folder.path().join("real.png")).unwrap().starts_with(b"\x89PNG"));
+    glimt::film::write_whole(&folder.path().join("link.png"), b"text").unwrap();
+    assert!(folder.path().join("link.png").is_symlink());
+    assert_eq!(std::fs::read(folder.path().join("real.png")).unwrap(), b"text");
 }
 
 #[test]

@@ -41,12 +41,21 @@ fn rays_that_overflow_their_stack_are_traced_again() {
     let waves = Options { samples_in_flight: 640, samples: 3, ..options.clone() };
     assert_eq!(draw(&scene, &waves).0, draw(&scene, &Options { samples: 3, ..options.clone() }).0);
     assert_eq!(film, storage_renderer().render(&scene, &options).unwrap().0);
-    // Through instances of the needles, the way back to the nodes of the world's tree among what waits on the stack. With more than twice as many a ray
-    // may meet more than this driver's loops allow, depending on which rays are its neighbours.
+    // Before their kernel is there, many lights leave more rays than the queue holds.
+    let mut lit = scene.clone();
+    let around = |index: u32| DVec3::new(f64::from(index).cos(), f64::from(index).sin(), 1.0);
+    lit.lights = (0..64).map(|index| Light::point(4.0 * around(index), DVec3::ONE)).collect();
+    let options_of_lit = Options { size: (40, 30), ..options.clone() };
+    let (film, report) = draw(&lit, &options_of_lit);
+    let retraced = report.passes.iter().find(|pass| pass.name == "retrace").map_or(0, |pass| pass.items);
+    assert!(retraced > 3 * 40 * 30, "{retraced} rays are traced again");
+    assert_eq!(film, draw(&lit, &Options { bvh: Some(Quality::Best), ..options_of_lit }).0);
+    // Through instances of the needles, the way back to the nodes of the world's tree among what waits on the stack. Of so many a ray may meet more than
+    // this driver's loops allow, depending on which rays are its neighbours.
     let mut many = scene.clone();
     let moved = |x: f64| Instance { mesh: 0, world_from_object: DMat4::from_translation(DVec3::X * x) };
-    many.instances = (-3..=3).map(|place| moved(0.1 * f64::from(place))).collect();
-    let shared = Options { instancing: Instancing::Shared, ..options.clone() };
+    many.instances = (-24..=24).map(|place| moved(0.02 * f64::from(place))).collect();
+    let shared = Options { instancing: Instancing::Shared, size: (40, 30), ..options.clone() };
     let (film, report) = draw(&many, &shared);
     assert!(report.passes.iter().any(|pass| pass.name == "retrace" && pass.items > 100));
     assert_eq!(film, draw(&many, &Options { bvh: Some(Quality::Best), ..shared }).0, "the trees' shapes never show");
@@ -61,17 +70,22 @@ fn rays_that_the_driver_would_cut_short_are_traced_part_by_part() {
     let mut mesh =
         shapes::square([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)].map(|(x, y)| Vec3::new(x, y, -1.0)));
     mesh.positions.extend([Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1.001, 0.0)]);
-    for copies in [1_000, 100_000] {
+    // Alone; shared and too large to be walked through at once; small and shared by many.
+    for (copies, instances) in [(1_000, 1), (100_000, 1), (100_000, 3), (100, 1_500)] {
         mesh.triangles.truncate(2);
         mesh.triangles.extend(std::iter::repeat_n([4, 5, 6], copies));
-        let scene = scene_of(vec![(mesh.clone(), DMat4::IDENTITY, exact(0.25, 0.0, 0.0, 1.0, 0.0))], Vec::new());
-        let options =
-            Options { size: (16, 16), camera: look(DVec3::new(0.01, 0.0, 5.0), DVec3::ZERO), ..Options::default() };
+        let mut scene = scene_of(vec![(mesh.clone(), DMat4::IDENTITY, exact(0.25, 0.0, 0.0, 1.0, 0.0))], Vec::new());
+        let behind = |place: i32| DMat4::from_translation(DVec3::NEG_Z * 1e-4 * f64::from(place));
+        scene.instances = (0..instances).map(|place| Instance { mesh: 0, world_from_object: behind(place) }).collect();
+        let instancing = if instances > 1 { Instancing::Shared } else { Instancing::Flat };
+        let camera = look(DVec3::new(0.01, 0.0, 5.0), DVec3::ZERO);
+        let options = Options { size: (16, 16), camera, instancing, ..Options::default() };
         let (film, report) = draw(&scene, &options);
         let hits = film.pixels.iter().filter(|pixel| pixel[0] == 0.25).count();
-        assert!(hits > 100, "{copies}: hits were lost");
+        assert_eq!(hits, 144, "{instances} × {copies}: as many pixels as show the square");
         let again = report.passes.iter().find(|pass| pass.name == "retrace").map_or(0, |pass| pass.dispatches);
-        assert!(copies == 1_000 || again > 20, "{copies}: traced again in {again} parts");
+        println!("{instances} × {copies}: traced again in {again} dispatches");
+        assert!(copies * instances as usize == 1_000 || again > 20, "{instances} × {copies}: {again} parts");
     }
 }
 

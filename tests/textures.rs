@@ -243,6 +243,20 @@ fn blended_layers_add_up_in_order() {
 }
 
 #[test]
+fn the_mean_alpha_of_many_samples_is_that_of_one() {
+    let scene = layers(1, 0.1, |_| DVec3::ONE);
+    let background = Background::Transparent;
+    let one_pixel = Options { size: (1, 1), samples: 1 << 15, background, ..Options::default() };
+    let options = Options { fov: Some(0.1), ..frontal(one_pixel) };
+    let film = draw(&scene, &options).0;
+    for value in film.pixels[0] {
+        assert!((f64::from(value) - 0.1).abs() < 1e-7, "{value} not 0.1");
+    }
+    // What is left of rounding goes on from wave to wave.
+    assert_eq!(film, draw(&scene, &Options { samples_in_flight: 1 << 14, ..options }).0);
+}
+
+#[test]
 fn layers_end_at_their_bound_without_a_gap() {
     for count in [31, 32, 33, 40] {
         let scene = layers(count, 0.02, |_| DVec3::ONE);

@@ -75,13 +75,13 @@ FETCH_VIEW(23, radiances, radiance)
 STORAGE_BUFFER(24, vec4, film)
 /// The same, to be read.
 FETCH_VIEW(25, film_so_far, film)
-/// What rounding took from each pixel's sum, with the sum of the weights.
+/// What rounding took from each pixel's sum, with the sum of the weights; with LAYERS a texel for its alpha, too.
 STORAGE_BUFFER(26, vec4, film_rest)
 /// The same, to be read.
 FETCH_VIEW(27, film_rest_so_far, film_rest)
 /// Offsets from the pixel's centre at which FILTER_STEPS equal parts of a filter's weight end: this one's and the next one's.
 FETCH_BUFFER(28, filter_steps)
-/// Tracing again subtree by subtree: what each ray in the retrace queue has hit so far, three texels.
+/// Tracing again subtree by subtree: what each ray in the retrace queue has hit so far, PARTIAL_HIT_TEXELS each.
 STORAGE_BUFFER(29, uvec4, partial_hits)
 /// The tree, for a child's reference alone.
 FETCH_WORDS(30, node_words, nodes)

@@ -44,6 +44,8 @@ const uint LIGHT_TEXELS = 4u;
 const uint INSTANCE_TEXELS = 8u;
 /// Texels in a HitItem or a RayItem.
 const uint ITEM_TEXELS = 2u;
+/// Texels in what a ray that is traced again has hit so far.
+const uint PARTIAL_HIT_TEXELS = 2u;
 
 /// Added to the precedence of a triangle whose back is hit; its own is below.
 const uint PRECEDENCE_BACK = 0x80000000u;

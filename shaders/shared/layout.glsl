@@ -87,6 +87,8 @@ struct Step {
     uint again;
     /// Tracing again: reference of the subtree that is walked.
     uint root;
+    /// Tracing again: where that is an instance, reference of the subtree of its own tree that is walked; 0 for all of it.
+    uint below;
     /// Tracing again: 1 = no subtree was walked before.
     uint first_part;
     /// Tracing again: 1 = this is the last subtree.

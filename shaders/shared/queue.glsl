@@ -1,7 +1,8 @@
 // Queues: an array of items and counters. A pass fills a queue; `prepare` then makes what was filled ready for the pass that
 // works on it, and the queue may be filled again from its start once that pass is done. One pixel sample has at most one item
 // in each queue at a time, so a queue as long as the samples in flight cannot overflow, what a sample carries along lies at its
-// own place, and adding to its radiance needs no atomics.
+// own place, and adding to its radiance needs no atomics. Only the queue of rays to be traced again may get more, in a wave that is worth nothing:
+// no pass empties it before the host knows that one fills it.
 
 /// Takes the next free place of a queue: one atomic operation a subgroup.
 uint queue_append(uint queue) {
@@ -37,7 +38,9 @@ void append_reflection_ray(RayItem item) {
 /// one for all of a subgroup costs instructions where no ray is left, too.
 void trace_again(uint place, uint pass) {
     atomicOr(counters[COUNTER_AGAIN], pass);
-    retrace_queue[atomicAdd(counters[COUNTER_FILLING + QUEUE_RETRACE], 1u)] = place;
+    uint own = atomicAdd(counters[COUNTER_FILLING + QUEUE_RETRACE], 1u);
+    if (own < uint(retrace_queue.length()))
+        retrace_queue[own] = place;
 }
 
 /// Workgroups that stay neighbours when the grid is interleaved: no divisor or multiple of the tiles in a row of common widths.

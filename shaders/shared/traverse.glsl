@@ -210,7 +210,8 @@ void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
             leave_instance(walk, world_ray);
         } else if (is_instance(node)) {
             stack[height++] = LEAVE_GROUP;
-            node = enter_instance(walk, world_ray, node);
+            int root = enter_instance(walk, world_ray, node);
+            node = step_now.below != 0u ? int(step_now.below) : root;
             continue;
         } else {
             found = visit_leaf(walk, node, any, hit);
@@ -315,14 +316,17 @@ Hit no_hit(float distance) {
 Hit hit_so_far(uint index, float distance) {
     Hit hit = no_hit(distance);
     if (RETRACE) {
-        uvec4 first = partial_hits[3u * index];
-        uint triangle = step_now.first_part != 0u ? NO_TRIANGLE : first.y;
-        vec3 passed = uintBitsToFloat(partial_hits[3u * index + 2u].xyz);
-        hit.passed = mix(passed, vec3(1.0), bvec3(step_now.first_part != 0u));
-        if (triangle != NO_TRIANGLE)
-            hit = Hit(uintBitsToFloat(first.x), triangle, FETCH(triangles, triangle * TRIANGLE_TEXELS).w,
-                      uintBitsToFloat(first.zw), partial_hits[3u * index + 1u].x, partial_hits[3u * index + 1u].y,
-                      hit.passed);
+        uvec4 first = partial_hits[PARTIAL_HIT_TEXELS * index];
+        uvec4 second = partial_hits[PARTIAL_HIT_TEXELS * index + 1u];
+        uint triangle_and_back = step_now.first_part != 0u ? NO_TRIANGLE : first.y;
+        hit.passed = mix(uintBitsToFloat(second.xyz), vec3(1.0), bvec3(step_now.first_part != 0u));
+        if (triangle_and_back != NO_TRIANGLE) {
+            uint triangle = triangle_and_back & ~PRECEDENCE_BACK;
+            uint texel = triangle * TRIANGLE_TEXELS;
+            uint precedence = FETCH(triangles, texel + 2u).w | (triangle_and_back & PRECEDENCE_BACK);
+            hit = Hit(uintBitsToFloat(first.x), triangle, FETCH(triangles, texel).w, uintBitsToFloat(first.zw), second.w,
+                      precedence, hit.passed);
+        }
     }
     return hit;
 }
@@ -331,9 +335,10 @@ Hit hit_so_far(uint index, float distance) {
 bool is_last_part(uint index, Hit hit) {
     if (!RETRACE)
         return true;
-    partial_hits[3u * index] = uvec4(floatBitsToUint(hit.t), hit.triangle, floatBitsToUint(hit.barycentrics));
-    partial_hits[3u * index + 1u] = uvec4(hit.instance, hit.precedence, 0u, 0u);
-    partial_hits[3u * index + 2u] = uvec4(floatBitsToUint(hit.passed), 0u);
+    // A triangle's number has room for whether its back was hit; of none all bits are set.
+    uint triangle = hit.triangle | (hit.precedence & PRECEDENCE_BACK);
+    partial_hits[PARTIAL_HIT_TEXELS * index] = uvec4(floatBitsToUint(hit.t), triangle, floatBitsToUint(hit.barycentrics));
+    partial_hits[PARTIAL_HIT_TEXELS * index + 1u] = uvec4(floatBitsToUint(hit.passed), hit.instance);
     // A condition of the whole dispatch, made one of this thread: see kernel.glsl.
     return all(bvec2(step_now.last_part != 0u, index != NO_ITEM));
 }

@@ -8,7 +8,7 @@ use image::Rgb;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::io::{BufWriter, Cursor, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How a picture is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,18 +50,21 @@ impl Format {
     }
 }
 
-/// A temporary file beside the target, removed again unless it is renamed.
-fn temporary(path: &Path) -> Result<tempfile::NamedTempFile> {
+/// A temporary file beside the target, removed again unless it is renamed, and the target: behind a symbolic link it is what that names, not the
+/// link.
+fn temporary(path: &Path) -> Result<(tempfile::NamedTempFile, PathBuf)> {
     if path.is_dir() {
         return Err(Error::write(path, "it is a folder"));
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".glimt-");
     // Temporary files are private by default; a picture is as public as any new file (the umask still applies).
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder).map_err(|error| Error::write(path, error.to_string()))
+    let file = builder.tempfile_in(folder).map_err(|error| Error::write(path, error.to_string()))?;
+    Ok((file, target))
 }
 
 /// Finds out, before any work is done, whether a picture could be written there.
@@ -77,9 +80,9 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// # Errors
 /// `Write` when that fails.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut file = temporary(path)?;
+    let (mut file, target) = temporary(path)?;
     file.write_all(bytes).map_err(|error| Error::write(path, error))?;
-    file.persist(path).map_err(|error| Error::write(path, error.error))?;
+    file.persist(target).map_err(|error| Error::write(path, error.error))?;
     Ok(())
 }
 
@@ -104,15 +107,13 @@ impl Film {
         notes: &[(&str, String)],
         may_finish: impl FnOnce() -> Result<()>,
     ) -> Result<Saved> {
-        // Behind a symbolic link the picture it names is replaced, not the link.
-        let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        let mut file = temporary(&target)?;
+        let (mut file, target) = temporary(path)?;
         let mut writer = BufWriter::new(file.as_file_mut());
         let saved = self.encode(&mut writer, format, notes, path)?;
         writer.flush().map_err(|error| Error::write(path, error))?;
         drop(writer);
         may_finish()?;
-        file.persist(&target).map_err(|error| Error::write(path, error.error))?;
+        file.persist(target).map_err(|error| Error::write(path, error.error))?;
         Ok(saved)
     }
 

@@ -1,12 +1,13 @@
 //! The frame: the order of the passes, wave by wave, and what comes back.
 
+use super::subtrees::Subtree;
 use super::tracers::{Again, Kernels, Tracers};
 use super::{upload, Options, Plan, Renderer};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{
     binding, Step, AGAIN_PRIMARY, AGAIN_REFLECTION, AGAIN_SHADOW, COUNTERS, COUNTER_AGAIN, COUNTER_LOST, COUNTER_TOTAL,
-    QUEUES, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_RETRACE, QUEUE_SHADOW, TILE, WORKGROUP,
+    PARTIAL_HIT_TEXELS, QUEUES, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_RETRACE, QUEUE_SHADOW, TILE, WORKGROUP,
 };
 use crate::report;
 use crate::scene::{Background, View};
@@ -24,8 +25,8 @@ pub(super) struct Frame<'a> {
     /// Traces again what overflowed or was uncertain.
     again: Again,
     /// Subtrees that tracing again walks through one by one: the whole tree, unless that is too much for one dispatch.
-    parts: Vec<u32>,
-    /// What to do then; `None` where it cannot be divided.
+    parts: Vec<Subtree>,
+    /// What to do then; `None` when it was done.
     smaller_parts: Option<Parts<'a>>,
     // Dropped before the buffers it names.
     pub bindings: Bindings,
@@ -36,8 +37,8 @@ pub(super) struct Frame<'a> {
     totals: Totals,
 }
 
-/// Finds the subtrees for rays that are too long for one dispatch, when there are such; `None` where it cannot be divided.
-pub(super) type Parts<'a> = Box<dyn FnOnce() -> Option<Vec<u32>> + 'a>;
+/// Finds the subtrees for rays that are too long for one dispatch, when there are such.
+pub(super) type Parts<'a> = Box<dyn FnOnce() -> Vec<Subtree> + 'a>;
 
 /// What a frame tells besides its pixels.
 pub(super) struct Outcome {
@@ -50,6 +51,8 @@ pub(super) struct Outcome {
 const COUNTER_BYTES: usize = (4 * COUNTERS as usize).next_multiple_of(PIXEL_BYTES);
 /// Bytes of a pixel.
 const PIXEL_BYTES: usize = size_of::<[f32; 4]>();
+/// Bytes of what a ray that is traced again has hit so far: no more than of an item in any queue.
+const PARTIAL_HIT_BYTES: u64 = 16 * PARTIAL_HIT_TEXELS as u64;
 /// Most dispatches of a wave that are timed one by one.
 const MOST_TIMED: u64 = 16_384;
 
@@ -84,7 +87,7 @@ impl<'a> Frame<'a> {
             view,
             kernels,
             again: Again::default(),
-            parts: vec![0],
+            parts: vec![Subtree::default()],
             smaller_parts: Some(smaller_parts),
             totals: Totals::new(&plan),
             plan,
@@ -172,18 +175,21 @@ impl<'a> Frame<'a> {
         commands.barrier(Access::ShaderWrite, Access::ShaderAndIndirect);
     }
 
-    /// Traces again what `pass`, the one before, left to it, once it is known that it leaves anything.
+    /// Traces again what `pass`, the one before, left to it, once it is known that any pass leaves anything. Where it is not known of this one,
+    /// what it left is dropped, so that the next pass does not take it for its own; the host runs the wave once more.
     pub fn trace_again(&self, commands: &mut Commands, wave: Step, pass: u32) {
-        if let Some(kernel) = self.again.kernel(pass) {
-            self.prepare(commands, &[QUEUE_RETRACE]);
-            let arguments = self.buffer(binding::DISPATCHES);
-            for (index, root) in self.parts.iter().enumerate() {
-                let (first_part, last_part) = (u32::from(index == 0), u32::from(index + 1 == self.parts.len()));
-                let step = Step { root: *root, first_part, last_part, ..wave };
-                commands.dispatch_indirect(kernel, bytemuck::bytes_of(&step), arguments, QUEUE_RETRACE.into());
-                // Partial hits: this part wrote, the next reads.
-                commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
-            }
+        if self.again.passes() == 0 {
+            return;
+        }
+        self.prepare(commands, &[QUEUE_RETRACE]);
+        let Some(kernel) = self.again.kernel(pass) else { return };
+        let arguments = self.buffer(binding::DISPATCHES);
+        for (index, Subtree { root, below }) in self.parts.iter().copied().enumerate() {
+            let (first_part, last_part) = (u32::from(index == 0), u32::from(index + 1 == self.parts.len()));
+            let step = Step { root, below, first_part, last_part, ..wave };
+            commands.dispatch_indirect(kernel, bytemuck::bytes_of(&step), arguments, QUEUE_RETRACE.into());
+            // Partial hits: this part wrote, the next reads.
+            commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
         }
     }
 
@@ -205,18 +211,19 @@ impl<'a> Frame<'a> {
         if lost == 0 {
             return Ok(false);
         }
-        self.parts = self.smaller_parts.take().and_then(|parts| parts()).ok_or_else(|| {
+        let parts = self.smaller_parts.take().ok_or_else(|| {
             Error::Device(format!(
                 "{lost} rays meet more boxes and triangles than this driver's loops allow; the picture would be wrong \
-                 and was not written. Where meshes are shared, --instances flat helps"
+                 and was not written"
             ))
         })?;
+        self.parts = parts();
         Ok(true)
     }
 
     /// Allocates what rays that are traced again keep between subtrees.
     fn make_partial_hits(&mut self) -> Result<()> {
-        let bytes = 3 * 16 * u64::from(self.plan.band_pixels) * u64::from(self.plan.wave_samples);
+        let bytes = PARTIAL_HIT_BYTES * u64::from(self.plan.band_pixels) * u64::from(self.plan.wave_samples);
         let slot = binding::PARTIAL_HITS;
         let made = upload::frame_buffer(self.renderer, slot, "partial hits", bytes)?;
         let old = self.buffers.insert(slot, made);

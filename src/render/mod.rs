@@ -6,6 +6,7 @@ mod options;
 mod plan;
 mod progressive;
 pub mod ray_sets;
+mod subtrees;
 mod textures;
 mod trace;
 mod tracers;
@@ -246,7 +247,7 @@ impl Renderer {
         let device_tree = tree.for_device(soup, view.camera.eye);
         let on_device =
             upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase, textures: &textures };
-        let mut frame = frame::Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts()))?;
+        let mut frame = frame::Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts(soup)))?;
         let upload = milliseconds(start);
         let start = Instant::now();
         let (film, convergence) = if progressive::is_wanted(options) {

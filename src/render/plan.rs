@@ -198,7 +198,8 @@ impl Plan {
         buffer("throughput", queue(goes_on, PIXEL as usize), true);
         buffer("radiance", in_flight * PIXEL, false);
         buffer("film", u64::from(self.band_pixels) * PIXEL, false);
-        buffer("film_rest", if features.multisampling { u64::from(self.band_pixels) * PIXEL } else { 0 }, false);
+        let rests = u64::from(features.multisampling) * if features.layers { 2 } else { 1 };
+        buffer("film_rest", rests * u64::from(self.band_pixels) * PIXEL, false);
         buffer("filter_steps", if features.filter { u64::from(FILTER_STEPS) * TEXEL } else { 0 }, false);
         // Made when a walk was too long for one dispatch.
         buffer("partial_hits", 0, false);

@@ -8,7 +8,8 @@ use crate::layout::{
 use crate::scene::{self, Map, Mipmaps, Pixels, Scene, UsedMap, Wrap};
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Levels that a record has room for.
 const MOST_LEVELS: usize = 16;
@@ -19,12 +20,21 @@ const TEXEL: usize = 16;
 #[derive(Default)]
 pub(super) struct Textures {
     used: Vec<UsedMap>,
+    /// Places there.
+    places: HashMap<Use, u32>,
     /// In the same order.
     pub records: Vec<Texture>,
     /// Levels of pictures, each from a whole texel on.
     pub pixels: Vec<[u32; 4]>,
     /// How often a picture was halved because the device cannot bind all of them.
     pub halved: usize,
+}
+
+/// A use of a map as a key: texture, set of coordinates, bits of the transform, whether it is in sRGB.
+type Use = (usize, usize, [[u64; 3]; 2], bool);
+
+fn key(UsedMap { map, is_srgb }: &UsedMap) -> Use {
+    (map.texture, map.texcoord, map.transform.map(|row| row.map(f64::to_bits)), *is_srgb)
 }
 
 /// A picture in the form in which some textures need it: which, in sRGB or not, with a mipmap or not.
@@ -45,7 +55,8 @@ impl Textures {
             for (map, is_srgb) in scene.materials[material].drawn_maps().list() {
                 let Some(map) = map.filter(|map| scene.image_of(map).is_some()) else { continue };
                 let used = UsedMap { map, is_srgb };
-                if !textures.used.contains(&used) {
+                if let Entry::Vacant(place) = textures.places.entry(key(&used)) {
+                    place.insert(textures.used.len() as u32);
                     textures.used.push(used);
                 }
             }
@@ -84,7 +95,7 @@ impl Textures {
 
     /// What a [`Look`](crate::layout::Look) calls a map: 0 where there is no picture behind it.
     pub fn number_of(&self, used: &UsedMap) -> u32 {
-        self.used.iter().position(|own| own == used).map_or(0, |place| place as u32 + 1)
+        self.places.get(&key(used)).map_or(0, |place| place + 1)
     }
 
     /// Bytes of a texture buffer's pixels.

@@ -102,7 +102,7 @@ impl Renderer {
         let device_tree = tree.for_device(soup, view.camera.eye);
         let on_device =
             upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase, textures: &textures };
-        let frame = Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts()))?;
+        let frame = Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts(soup)))?;
         Ok(Tracer { frame, prepared, rebase: tree.rebase, order: device_tree.order, _alone: alone })
     }
 }

@@ -27,11 +27,6 @@ pub struct Tree {
     pub update: Option<report::TreeUpdate>,
 }
 
-/// Rounds of loops that no driver cuts short: Mesa 22.3 ends them after 65 535.
-const MOST_ROUNDS: u64 = 60_000;
-/// Rays that such a driver runs side by side at most.
-const LANES: u64 = 16;
-
 /// The tree over a part of the soup.
 pub(super) struct Part {
     pub bvh: Bvh,
@@ -220,36 +215,6 @@ impl Tree {
     fn deepest(&self, of: impl Fn(&Bvh) -> u32) -> u32 {
         let lower = self.parts.iter().map(|part| of(&part.bvh)).max().unwrap_or(0);
         lower + self.upper.as_ref().map_or(0, of)
-    }
-
-    /// References of subtrees that together are the tree, each small enough that no walk through it is cut short. `None` where
-    /// instances share meshes: what is below an instance cannot be divided.
-    pub(super) fn in_parts(&self) -> Option<Vec<u32>> {
-        if self.upper.is_some() {
-            return None;
-        }
-        let bvh = &self.parts.first()?.bvh;
-        // A round each for the nodes and leaves, and, as each ray of a subgroup may be in another leaf, one for each triangle and ray.
-        let mut rounds = vec![0_u64; bvh.wide.nodes.len()];
-        let of_child = |rounds: &[u64], child: Child| match child {
-            Child::Node(index) => rounds[index as usize],
-            Child::Leaf { count, .. } => 1 + u64::from(count) * LANES,
-        };
-        let children = |index: usize| bvh.wide.nodes[index].iter().flatten().map(|wide| wide.child);
-        for index in (0..bvh.wide.nodes.len()).rev() {
-            rounds[index] = 1 + children(index).map(|child| of_child(&rounds, child)).sum::<u64>();
-        }
-        let mut parts = Vec::new();
-        let mut open = vec![Child::Node(0)];
-        while let Some(child) = open.pop() {
-            match child {
-                Child::Node(index) if of_child(&rounds, child) > MOST_ROUNDS => {
-                    open.extend(children(index as usize));
-                }
-                _ => parts.push(reference(child, 0, 0)),
-            }
-        }
-        Some(parts)
     }
 
     /// Counts for a report: the deepest path through both levels; the cost of the tree that rays enter first, with an instance

@@ -66,7 +66,7 @@ impl Tree {
                 }
                 Child::Leaf { .. } => !slot,
             };
-            slots.push(Slot::new(&Box4 { lo: bounds.lo.extend(0.0), hi: bounds.hi.extend(0.0) }, content));
+            slots.push(Slot::new(&(*bounds).into(), content));
         }
         let mut tree = Self { slots, slot_of, heights: vec![1; nodes.len()] };
         // A node comes before what is below it. Where triangles are cut, its box may be wider than its children's.
