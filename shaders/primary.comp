@@ -23,7 +23,7 @@ Ray camera_ray(vec2 point) {
 void main() {
     begin();
     uint thread = interleaved_thread();
-    uint sample_index = RETRACE ? queue_item(thread, QUEUE_RETRACE) : thread;
+    uint sample_index = RETRACE ? queue_item(thread, QUEUE_PRIMARY_AGAIN) : thread;
     uint pixel = sample_index;
     uint sample_of_wave = 0u;
     if (MULTISAMPLING) {
@@ -47,7 +47,7 @@ void main() {
     Ray ray = camera_ray(vec2(place) + inside);
     Hit hit = hit_so_far(thread, FAR);
     if (!traverse(ray, false, hit)) {
-        trace_again(sample_index, AGAIN_PRIMARY);
+        trace_again(sample_index, QUEUE_PRIMARY_AGAIN);
         return;
     }
     if (!is_last_part(thread, hit))

@@ -13,13 +13,13 @@
 void main() {
     begin();
     uint thread = interleaved_thread();
-    uint index = queue_item(thread, QUEUE_REFLECTION);
+    uint index = queue_item(thread, RETRACE ? QUEUE_REFLECTION_AGAIN : QUEUE_REFLECTION);
     if (index == NO_ITEM)
         return;
     RayItem item = ray_item(FETCH(reflection_items, index * ITEM_TEXELS), FETCH(reflection_items, index * ITEM_TEXELS + 1u));
     Hit hit = hit_so_far(thread, item.distance);
     if (!traverse(Ray(item.origin, item.direction), false, hit)) {
-        trace_again(index, AGAIN_REFLECTION);
+        trace_again(index, QUEUE_REFLECTION_AGAIN);
         return;
     }
     if (!is_last_part(thread, hit))

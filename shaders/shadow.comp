@@ -11,13 +11,13 @@
 void main() {
     begin();
     uint thread = interleaved_thread();
-    uint index = queue_item(thread, QUEUE_SHADOW);
+    uint index = queue_item(thread, RETRACE ? QUEUE_SHADOW_AGAIN : QUEUE_SHADOW);
     if (index == NO_ITEM)
         return;
     RayItem item = ray_item(FETCH(shadow_items, index * ITEM_TEXELS), FETCH(shadow_items, index * ITEM_TEXELS + 1u));
     Hit hit = hit_so_far(thread, item.distance);
     if (!traverse(Ray(item.origin, item.direction), true, hit)) {
-        trace_again(index, AGAIN_SHADOW);
+        trace_again(index, QUEUE_SHADOW_AGAIN);
         return;
     }
     if (!is_last_part(thread, hit))

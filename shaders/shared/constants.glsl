@@ -68,28 +68,24 @@ const uint QUEUE_HIT = 0u;
 const uint QUEUE_SHADOW = 1u;
 /// Queue of reflected rays that wait to be traced.
 const uint QUEUE_REFLECTION = 2u;
-/// Queue of rays whose walk is to be done again: it overflowed its stack, or could not tell whether it hits.
-const uint QUEUE_RETRACE = 3u;
+/// Queue of camera rays whose walk is to be done again: it overflowed its stack, or could not tell whether it hits. It shares its array with the next two.
+const uint QUEUE_PRIMARY_AGAIN = 3u;
+/// Queue of such shadow rays.
+const uint QUEUE_SHADOW_AGAIN = 4u;
+/// Queue of such reflected rays.
+const uint QUEUE_REFLECTION_AGAIN = 5u;
 /// Number of queues.
-const uint QUEUES = 4u;
+const uint QUEUES = 6u;
 /// First counter of the items that wait in each queue while it is being filled.
 const uint COUNTER_FILLING = 0u;
 /// First counter of the items that the pass which empties each queue works on.
-const uint COUNTER_READY = 4u;
+const uint COUNTER_READY = 6u;
 /// First counter of the items that each queue has had in all.
-const uint COUNTER_TOTAL = 8u;
+const uint COUNTER_TOTAL = 12u;
 /// Counter of rays whose second traversal was cut short too.
-const uint COUNTER_LOST = 12u;
-/// Counter that holds, as bits, which passes left rays to be traced again.
-const uint COUNTER_AGAIN = 13u;
+const uint COUNTER_LOST = 18u;
 /// Number of counters.
-const uint COUNTERS = 14u;
-/// Bit of the primary pass where passes are bits.
-const uint AGAIN_PRIMARY = 1u;
-/// Bit of the shadow pass.
-const uint AGAIN_SHADOW = 2u;
-/// Bit of the reflection pass.
-const uint AGAIN_REFLECTION = 4u;
+const uint COUNTERS = 19u;
 
 /// Steps of the table that a filter's sample positions are read from.
 const uint FILTER_STEPS = 1024u;

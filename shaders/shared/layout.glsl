@@ -83,8 +83,6 @@ struct Step {
     uint seed;
     /// resolve: the first sample of the picture.
     uint start;
-    /// resolve: passes whose rays are traced again, as bits.
-    uint again;
     /// Tracing again: reference of the subtree that is walked.
     uint root;
     /// Tracing again: where that is an instance, reference of the subtree of its own tree that is walked; 0 for all of it.

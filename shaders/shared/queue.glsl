@@ -1,8 +1,8 @@
 // Queues: an array of items and counters. A pass fills a queue; `prepare` then makes what was filled ready for the pass that
 // works on it, and the queue may be filled again from its start once that pass is done. One pixel sample has at most one item
 // in each queue at a time, so a queue as long as the samples in flight cannot overflow, what a sample carries along lies at its
-// own place, and adding to its radiance needs no atomics. Only the queue of rays to be traced again may get more, in a wave that is worth nothing:
-// no pass empties it before the host knows that one fills it.
+// own place, and adding to its radiance needs no atomics. Only the queues of rays to be traced again may get more, in a wave that is worth nothing:
+// no pass empties one before the host knows that it is filled.
 
 /// Takes the next free place of a queue: one atomic operation a subgroup.
 uint queue_append(uint queue) {
@@ -34,11 +34,10 @@ void append_reflection_ray(RayItem item) {
     reflection_queue[texel + 1u] = floatBitsToUint(vec4(item.direction, item.distance));
 }
 
-/// Leaves a ray of this pass, with its place in the queue that it came from, to be traced again. So few are that each takes its own place: to take
+/// Leaves a ray, by its place in the queue that it came from, to be traced again. So few are that each takes its own place: to take
 /// one for all of a subgroup costs instructions where no ray is left, too.
-void trace_again(uint place, uint pass) {
-    atomicOr(counters[COUNTER_AGAIN], pass);
-    uint own = atomicAdd(counters[COUNTER_FILLING + QUEUE_RETRACE], 1u);
+void trace_again(uint place, uint queue) {
+    uint own = atomicAdd(counters[COUNTER_FILLING + queue], 1u);
     if (own < uint(retrace_queue.length()))
         retrace_queue[own] = place;
 }
@@ -59,10 +58,10 @@ uint interleaved_thread() {
     return (stretch * STRETCH + gl_WorkGroupID.x % STRETCH) * WORKGROUP + gl_LocalInvocationIndex;
 }
 
-/// The item of a thread, or NO_ITEM when there are fewer. Traced again, it is the one that overflowed.
+/// The item of a thread, or NO_ITEM when there are fewer. Traced again, it is the place of the one that was left.
 const uint NO_ITEM = 0xffffffffu;
 uint queue_item(uint index, uint queue) {
-    if (index >= counters[COUNTER_READY + (RETRACE ? QUEUE_RETRACE : queue)])
+    if (index >= counters[COUNTER_READY + queue])
         return NO_ITEM;
     return RETRACE ? retrace_queue[index] : index;
 }

@@ -6,8 +6,8 @@ use super::{upload, Options, Plan, Renderer};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{
-    binding, Step, AGAIN_PRIMARY, AGAIN_REFLECTION, AGAIN_SHADOW, COUNTERS, COUNTER_AGAIN, COUNTER_LOST, COUNTER_TOTAL,
-    PARTIAL_HIT_TEXELS, QUEUES, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_RETRACE, QUEUE_SHADOW, TILE, WORKGROUP,
+    binding, Step, COUNTERS, COUNTER_FILLING, COUNTER_LOST, COUNTER_TOTAL, PARTIAL_HIT_TEXELS, QUEUES, QUEUE_HIT,
+    QUEUE_PRIMARY_AGAIN, QUEUE_REFLECTION, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW, QUEUE_SHADOW_AGAIN, TILE, WORKGROUP,
 };
 use crate::report;
 use crate::scene::{Background, View};
@@ -114,7 +114,7 @@ impl<'a> Frame<'a> {
         commands.barrier(Access::Transfer, Access::ShaderReadWrite);
         commands.bind(primary, &self.bindings);
         commands.dispatch(primary, bytemuck::bytes_of(&wave), samples.div_ceil(WORKGROUP));
-        self.trace_again(commands, wave, AGAIN_PRIMARY);
+        self.trace_again(commands, wave, QUEUE_PRIMARY_AGAIN);
 
         for round in 0..rounds {
             let goes_on = reflection.is_some() && round + 1 < rounds;
@@ -139,20 +139,19 @@ impl<'a> Frame<'a> {
                 }
                 if let Some(shadow) = shadow {
                     commands.dispatch_indirect(shadow, bytemuck::bytes_of(&wave), arguments, QUEUE_SHADOW.into());
-                    self.trace_again(commands, wave, AGAIN_SHADOW);
+                    self.trace_again(commands, wave, QUEUE_SHADOW_AGAIN);
                     // Radiance and shadow queue: this light's shadow rays before the next pass on the same samples.
                     commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
                 }
             }
             if let (Some(reflection), true) = (reflection, goes_on) {
                 commands.dispatch_indirect(reflection, bytemuck::bytes_of(&wave), arguments, QUEUE_REFLECTION.into());
-                self.trace_again(commands, wave, AGAIN_REFLECTION);
+                self.trace_again(commands, wave, QUEUE_REFLECTION_AGAIN);
             }
         }
         // Radiance: every pass wrote, resolve reads. Film: the wave before wrote, resolve adds.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
-        let resolved = Step { again: self.again.passes(), ..wave };
-        commands.dispatch(&self.kernels.resolve, bytemuck::bytes_of(&resolved), wave.pixels.div_ceil(WORKGROUP));
+        commands.dispatch(&self.kernels.resolve, bytemuck::bytes_of(&wave), wave.pixels.div_ceil(WORKGROUP));
         // Film and counters: kernels wrote, copies read.
         commands.barrier(Access::ShaderWrite, Access::Transfer);
         let read_back = self.read_back(wave.first_pixel.into());
@@ -175,19 +174,15 @@ impl<'a> Frame<'a> {
         commands.barrier(Access::ShaderWrite, Access::ShaderAndIndirect);
     }
 
-    /// Traces again what `pass`, the one before, left to it, once it is known that any pass leaves anything. Where it is not known of this one,
-    /// what it left is dropped, so that the next pass does not take it for its own; the host runs the wave once more.
-    pub fn trace_again(&self, commands: &mut Commands, wave: Step, pass: u32) {
-        if self.again.passes() == 0 {
-            return;
-        }
-        self.prepare(commands, &[QUEUE_RETRACE]);
-        let Some(kernel) = self.again.kernel(pass) else { return };
+    /// Traces again what the pass before left in `queue`, once it is known that it leaves anything.
+    pub fn trace_again(&self, commands: &mut Commands, wave: Step, queue: u32) {
+        let Some(kernel) = self.again.kernel(queue) else { return };
+        self.prepare(commands, &[queue]);
         let arguments = self.buffer(binding::DISPATCHES);
         for (index, Subtree { root, below }) in self.parts.iter().copied().enumerate() {
             let (first_part, last_part) = (u32::from(index == 0), u32::from(index + 1 == self.parts.len()));
             let step = Step { root, below, first_part, last_part, ..wave };
-            commands.dispatch_indirect(kernel, bytemuck::bytes_of(&step), arguments, QUEUE_RETRACE.into());
+            commands.dispatch_indirect(kernel, bytemuck::bytes_of(&step), arguments, queue.into());
             // Partial hits: this part wrote, the next reads.
             commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
         }
@@ -199,12 +194,13 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// `Device` when it would not help.
     pub fn must_run_again(&mut self, counters: &[u32]) -> Result<bool> {
-        let passes = counters[COUNTER_AGAIN as usize] & !self.again.passes();
-        if passes != 0 {
-            if self.again.passes() == 0 {
+        let is_filled = |queue: &u32| counters[(COUNTER_FILLING + queue) as usize] != 0;
+        let mut filled = Again::QUEUES.into_iter().filter(is_filled).peekable();
+        if filled.peek().is_some() {
+            if self.again.is_empty() {
                 self.make_partial_hits()?;
             }
-            self.again.make(self.renderer, passes, self.plan.features)?;
+            filled.try_for_each(|queue| self.again.make(self.renderer, queue, self.plan.features))?;
             return Ok(true);
         }
         let lost = counters[COUNTER_LOST as usize];
@@ -292,7 +288,7 @@ impl<'a> Frame<'a> {
             return Err(Error::Interrupted);
         }
         let dispatches = self.plan.dispatches_of_a_wave(self.view.samples);
-        let again = if self.again.passes() != 0 { 1 + self.parts.len() as u64 } else { 0 };
+        let again = if !self.again.is_empty() { 1 + self.parts.len() as u64 } else { 0 };
         let timed = dispatches * (1 + again);
         let mut commands = Commands::new(&self.renderer.device, timed.min(MOST_TIMED) as usize)?;
         self.record(&mut commands, wave);
@@ -390,7 +386,7 @@ impl Totals {
                 "shade" => self.queued[QUEUE_HIT as usize] * u64::from(plan.lights),
                 "shadow" => shadow,
                 "reflection" => reflection,
-                "retrace" => self.queued[QUEUE_RETRACE as usize],
+                "retrace" => Again::QUEUES.into_iter().map(queued).sum(),
                 "resolve" => pixels * self.waves,
                 _ => pass.dispatches,
             };

@@ -8,8 +8,8 @@ use super::tracers::Kernels;
 use super::{upload, Options, Plan, Rebase, Renderer};
 use crate::error::{Error, Result};
 use crate::layout::{
-    binding, Features, HitItem, RayItem, Step, AGAIN_PRIMARY, AGAIN_REFLECTION, AGAIN_SHADOW, COUNTERS,
-    COUNTER_FILLING, FAR, QUEUE_HIT, QUEUE_REFLECTION, QUEUE_SHADOW, WORKGROUP,
+    binding, Features, HitItem, RayItem, Step, COUNTERS, COUNTER_FILLING, FAR, QUEUE_HIT, QUEUE_PRIMARY_AGAIN,
+    QUEUE_REFLECTION, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW, QUEUE_SHADOW_AGAIN, WORKGROUP,
 };
 use crate::scene::{Scene, View};
 use crate::vulkan::{Access, Buffer, Commands, Kernel, Usage};
@@ -174,15 +174,15 @@ impl Tracer<'_> {
         match kind {
             SetKind::Primary => {
                 commands.dispatch(&trace.primary, bytemuck::bytes_of(&wave), rays.div_ceil(WORKGROUP));
-                self.frame.trace_again(&mut commands, wave, AGAIN_PRIMARY);
+                self.frame.trace_again(&mut commands, wave, QUEUE_PRIMARY_AGAIN);
             }
             SetKind::Shadow => {
                 from_queue(&trace.shadow, QUEUE_SHADOW);
-                self.frame.trace_again(&mut commands, wave, AGAIN_SHADOW);
+                self.frame.trace_again(&mut commands, wave, QUEUE_SHADOW_AGAIN);
             }
             SetKind::Mirror | SetKind::Diffuse => {
                 from_queue(&trace.reflection, QUEUE_REFLECTION);
-                self.frame.trace_again(&mut commands, wave, AGAIN_REFLECTION);
+                self.frame.trace_again(&mut commands, wave, QUEUE_REFLECTION_AGAIN);
             }
         }
         // Queues, radiance, counters: kernels wrote, copies of the next submission read.

@@ -2,7 +2,7 @@
 
 use super::Renderer;
 use crate::error::Result;
-use crate::layout::{kernels, Features, KernelCode, AGAIN_PRIMARY, AGAIN_REFLECTION, AGAIN_SHADOW};
+use crate::layout::{kernels, Features, KernelCode, QUEUE_PRIMARY_AGAIN, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW_AGAIN};
 use crate::vulkan::Kernel;
 use std::sync::Arc;
 
@@ -40,35 +40,39 @@ impl Kernels {
     }
 }
 
-/// A pass that traces rays, and its kernel.
-const PASSES: [(u32, &KernelCode); 3] =
-    [(AGAIN_PRIMARY, &kernels::PRIMARY), (AGAIN_SHADOW, &kernels::SHADOW), (AGAIN_REFLECTION, &kernels::REFLECTION)];
+/// Queues of rays to be traced again, and the kernels whose variants do it.
+const QUEUES: [(u32, &KernelCode); 3] = [
+    (QUEUE_PRIMARY_AGAIN, &kernels::PRIMARY),
+    (QUEUE_SHADOW_AGAIN, &kernels::SHADOW),
+    (QUEUE_REFLECTION_AGAIN, &kernels::REFLECTION),
+];
 
-/// Variants that trace again, each made when a pass first leaves rays to it: few scenes need one.
+/// Variants that trace again, each made when rays are first left to it: few scenes need one.
 #[derive(Default)]
 pub(super) struct Again {
-    kernels: [Option<Arc<Kernel>>; PASSES.len()],
+    kernels: [Option<Arc<Kernel>>; QUEUES.len()],
 }
 
 impl Again {
-    /// Makes the kernels of these passes, as bits; those that are there stay.
-    pub fn make(&mut self, renderer: &Renderer, passes: u32, features: Features) -> Result<()> {
+    /// The queues.
+    pub const QUEUES: [u32; QUEUES.len()] = [QUEUES[0].0, QUEUES[1].0, QUEUES[2].0];
+
+    /// Makes the kernel of a queue.
+    pub fn make(&mut self, renderer: &Renderer, queue: u32, features: Features) -> Result<()> {
         let features = Features { retrace: true, ..features };
-        for (own, (pass, code)) in self.kernels.iter_mut().zip(PASSES) {
-            if passes & pass != 0 && own.is_none() {
-                *own = Some(renderer.kernel(code, features)?);
-            }
+        for (own, (_, code)) in self.kernels.iter_mut().zip(QUEUES).filter(|(_, (own, _))| *own == queue) {
+            *own = Some(renderer.kernel(code, features)?);
         }
         Ok(())
     }
 
-    /// The passes whose rays are traced again, as bits.
-    pub fn passes(&self) -> u32 {
-        self.kernels.iter().zip(PASSES).filter(|(own, _)| own.is_some()).map(|(_, (pass, _))| pass).sum()
+    /// Whether no ray is traced again.
+    pub fn is_empty(&self) -> bool {
+        self.kernels.iter().all(Option::is_none)
     }
 
-    /// The kernel of a pass.
-    pub fn kernel(&self, pass: u32) -> Option<&Arc<Kernel>> {
-        self.kernels.iter().zip(PASSES).find(|(_, (own, _))| *own == pass).and_then(|(kernel, _)| kernel.as_ref())
+    /// The kernel of a queue.
+    pub fn kernel(&self, queue: u32) -> Option<&Arc<Kernel>> {
+        self.kernels.iter().zip(QUEUES).find(|(_, (own, _))| *own == queue).and_then(|(kernel, _)| kernel.as_ref())
     }
 }
