@@ -314,3 +314,20 @@ fn interrupting_stops_with_an_error() {
     let result = renderer().render(&built_in("table").unwrap(), &options);
     assert_eq!(result.err().map(|error| error.exit_code()), Some(130));
 }
+
+#[test]
+fn a_wave_of_very_many_lights_can_be_stopped() {
+    let mut scene = built_in("cornell").unwrap();
+    let light = |index: i32| Light::point(DVec3::new(0.0, 0.5, 1e-4 * f64::from(index)), DVec3::splat(1e-3));
+    scene.lights = (0..20_000).map(light).collect();
+    let options = Options { size: (8, 8), ..small() };
+    let interrupted = options.interrupted.clone();
+    let stopped = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        interrupted.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+    // All lights are one wave.
+    let outcome = renderer().render(&scene, &options);
+    stopped.join().unwrap();
+    assert!(matches!(outcome, Err(glimt::Error::Interrupted)), "{:?}", outcome.map(|(_, report)| report.rays));
+}

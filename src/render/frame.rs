@@ -1,20 +1,19 @@
 //! The frame: the order of the passes, wave by wave, and what comes back.
 
 use super::subtrees::Subtree;
+use super::totals::{Outcome, Totals};
 use super::tracers::{Again, Kernels, Tracers};
 use super::{upload, Options, Plan, Renderer};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{
-    binding, Step, COUNTERS, COUNTER_FILLING, COUNTER_LOST, COUNTER_TOTAL, PARTIAL_HIT_TEXELS, QUEUES, QUEUE_HIT,
-    QUEUE_PRIMARY_AGAIN, QUEUE_REFLECTION, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW, QUEUE_SHADOW_AGAIN, TILE, WORKGROUP,
+    binding, Step, COUNTERS, COUNTER_FILLING, COUNTER_LOST, PARTIAL_HIT_TEXELS, QUEUE_HIT, QUEUE_PRIMARY_AGAIN,
+    QUEUE_REFLECTION, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW, QUEUE_SHADOW_AGAIN, TILE, WORKGROUP,
 };
-use crate::report;
 use crate::scene::{Background, View};
 use crate::vulkan::{Access, Bindings, Buffer, Commands, Memory, Usage};
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::atomic::Ordering;
 
 /// A scene on the device, ready to run.
 pub(super) struct Frame<'a> {
@@ -40,21 +39,14 @@ pub(super) struct Frame<'a> {
 /// Finds the subtrees for rays that are too long for one dispatch, when there are such.
 pub(super) type Parts<'a> = Box<dyn FnOnce() -> Vec<Subtree> + 'a>;
 
-/// What a frame tells besides its pixels.
-pub(super) struct Outcome {
-    pub passes: Vec<report::Pass>,
-    pub rays: report::Rays,
-    pub queue_bytes: u64,
-}
-
 /// Bytes of all counters, padded so that pixels behind them are aligned.
 const COUNTER_BYTES: usize = (4 * COUNTERS as usize).next_multiple_of(PIXEL_BYTES);
 /// Bytes of a pixel.
 const PIXEL_BYTES: usize = size_of::<[f32; 4]>();
 /// Bytes of what a ray that is traced again has hit so far: no more than of an item in any queue.
 const PARTIAL_HIT_BYTES: u64 = 16 * PARTIAL_HIT_TEXELS as u64;
-/// Most dispatches of a wave that are timed one by one.
-const MOST_TIMED: u64 = 16_384;
+/// From so many dispatches on they are submitted before more are recorded.
+const MOST_AT_ONCE: usize = 256;
 
 impl<'a> Frame<'a> {
     /// Allocates and fills the buffers of the plan and makes its kernels.
@@ -103,7 +95,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Records one wave: the whole algorithm.
-    fn record(&self, commands: &mut Commands, wave: Step) {
+    fn record(&self, commands: &mut Commands, wave: Step, options: &Options) -> Result<()> {
         let Plan { rounds, lights, .. } = self.plan;
         let Tracers { primary, shadow, reflection } = &self.kernels.trace;
         let arguments = self.buffer(binding::DISPATCHES);
@@ -114,11 +106,11 @@ impl<'a> Frame<'a> {
         commands.barrier(Access::Transfer, Access::ShaderReadWrite);
         commands.bind(primary, &self.bindings);
         commands.dispatch(primary, bytemuck::bytes_of(&wave), samples.div_ceil(WORKGROUP));
-        self.trace_again(commands, wave, QUEUE_PRIMARY_AGAIN);
+        self.trace_again(commands, wave, QUEUE_PRIMARY_AGAIN, options)?;
 
         for round in 0..rounds {
             let goes_on = reflection.is_some() && round + 1 < rounds;
-            self.prepare(commands, &[QUEUE_HIT]);
+            self.prepare(commands, &[QUEUE_HIT], options)?;
             for light in 0..lights {
                 // In the last round of layers, too: what is behind the last one is the background.
                 let is_last = light + 1 == lights;
@@ -132,21 +124,21 @@ impl<'a> Frame<'a> {
                 };
                 commands.dispatch_indirect(&self.kernels.shade, bytemuck::bytes_of(&step), arguments, QUEUE_HIT.into());
                 match (shadow.is_some(), reflect) {
-                    (true, true) => self.prepare(commands, &[QUEUE_SHADOW, QUEUE_REFLECTION]),
-                    (true, false) => self.prepare(commands, &[QUEUE_SHADOW]),
-                    (false, true) => self.prepare(commands, &[QUEUE_REFLECTION]),
+                    (true, true) => self.prepare(commands, &[QUEUE_SHADOW, QUEUE_REFLECTION], options)?,
+                    (true, false) => self.prepare(commands, &[QUEUE_SHADOW], options)?,
+                    (false, true) => self.prepare(commands, &[QUEUE_REFLECTION], options)?,
                     (false, false) => {}
                 }
                 if let Some(shadow) = shadow {
                     commands.dispatch_indirect(shadow, bytemuck::bytes_of(&wave), arguments, QUEUE_SHADOW.into());
-                    self.trace_again(commands, wave, QUEUE_SHADOW_AGAIN);
+                    self.trace_again(commands, wave, QUEUE_SHADOW_AGAIN, options)?;
                     // Radiance and shadow queue: this light's shadow rays before the next pass on the same samples.
                     commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
                 }
             }
             if let (Some(reflection), true) = (reflection, goes_on) {
                 commands.dispatch_indirect(reflection, bytemuck::bytes_of(&wave), arguments, QUEUE_REFLECTION.into());
-                self.trace_again(commands, wave, QUEUE_REFLECTION_AGAIN);
+                self.trace_again(commands, wave, QUEUE_REFLECTION_AGAIN, options)?;
             }
         }
         // Radiance: every pass wrote, resolve reads. Film: the wave before wrote, resolve adds.
@@ -162,30 +154,45 @@ impl<'a> Frame<'a> {
         }
         // What was read back: copies wrote, the host reads.
         commands.barrier(Access::Transfer, Access::HostRead);
+        Ok(())
+    }
+
+    /// Before a barrier: runs what is recorded when that is much, so that no submission takes so long that the system takes the device for dead, and
+    /// looks whether to go on.
+    fn breathe(&self, commands: &mut Commands, options: &Options) -> Result<()> {
+        if commands.dispatches() < MOST_AT_ONCE {
+            return Ok(());
+        }
+        commands.flush()?;
+        options.go_on()
     }
 
     /// Makes filled queues ready, with a barrier on either side.
-    pub fn prepare(&self, commands: &mut Commands, queues: &[u32]) {
+    pub fn prepare(&self, commands: &mut Commands, queues: &[u32], options: &Options) -> Result<()> {
+        self.breathe(commands, options)?;
         let queues = queues.iter().map(|queue| 1 << queue).sum();
         // Queues and counters: the pass before filled them, prepare reads.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
         commands.dispatch(&self.kernels.prepare, bytemuck::bytes_of(&Step { queues, ..Step::default() }), 1);
         // Arguments: prepare wrote, indirect dispatches read them and their kernels the counters.
         commands.barrier(Access::ShaderWrite, Access::ShaderAndIndirect);
+        Ok(())
     }
 
     /// Traces again what the pass before left in `queue`, once it is known that it leaves anything.
-    pub fn trace_again(&self, commands: &mut Commands, wave: Step, queue: u32) {
-        let Some(kernel) = self.again.kernel(queue) else { return };
-        self.prepare(commands, &[queue]);
+    pub fn trace_again(&self, commands: &mut Commands, wave: Step, queue: u32, options: &Options) -> Result<()> {
+        let Some(kernel) = self.again.kernel(queue) else { return Ok(()) };
+        self.prepare(commands, &[queue], options)?;
         let arguments = self.buffer(binding::DISPATCHES);
         for (index, Subtree { root, below }) in self.parts.iter().copied().enumerate() {
             let (first_part, last_part) = (u32::from(index == 0), u32::from(index + 1 == self.parts.len()));
             let step = Step { root, below, first_part, last_part, ..wave };
             commands.dispatch_indirect(kernel, bytemuck::bytes_of(&step), arguments, queue.into());
+            self.breathe(commands, options)?;
             // Partial hits: this part wrote, the next reads.
             commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
         }
+        Ok(())
     }
 
     /// Whether a pass left rays that nobody traced again, or they were cut short again: the wave is worth nothing and must be run
@@ -261,8 +268,7 @@ impl<'a> Frame<'a> {
             finished = Some((first_pixel, pixels));
         }
         finished.map_or(Ok(()), |band| self.collect(&mut film, band))?;
-        self.totals.samples += u64::from(count);
-        self.totals.waves += u64::from(count.div_ceil(wave_samples));
+        self.totals.add_samples(count, wave_samples);
         Ok(film)
     }
 
@@ -284,14 +290,9 @@ impl<'a> Frame<'a> {
         options: &Options,
         host_work: &mut impl FnMut(&Self) -> Result<()>,
     ) -> Result<bool> {
-        if options.interrupted.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
-        }
-        let dispatches = self.plan.dispatches_of_a_wave(self.view.samples);
-        let again = if !self.again.is_empty() { 1 + self.parts.len() as u64 } else { 0 };
-        let timed = dispatches * (1 + again);
-        let mut commands = Commands::new(&self.renderer.device, timed.min(MOST_TIMED) as usize)?;
-        self.record(&mut commands, wave);
+        options.go_on()?;
+        let mut commands = Commands::new(&self.renderer.device, 2 * MOST_AT_ONCE)?;
+        self.record(&mut commands, wave, options)?;
         let mut worked = Ok(());
         let times = commands.submit_and_wait_beside(|| worked = host_work(self))?;
         worked?;
@@ -337,61 +338,4 @@ fn even_bits(code: usize) -> usize {
 fn bind(renderer: &Renderer, buffers: &BTreeMap<u32, Buffer>) -> Result<Bindings> {
     let shown = |slot: u32| binding::ALL[slot as usize].view_of.unwrap_or(slot);
     Bindings::new(&renderer.layout, |slot| &buffers[&shown(slot)])
-}
-
-/// Sums over waves.
-struct Totals {
-    passes: Vec<report::Pass>,
-    /// Items that each queue has had.
-    queued: [u64; QUEUES as usize],
-    /// Samples of each pixel.
-    samples: u64,
-    /// Waves of each pixel.
-    waves: u64,
-}
-
-impl Totals {
-    fn new(plan: &Plan) -> Self {
-        let pass = |planned: &super::PlannedPass| report::Pass { name: planned.name, ..Default::default() };
-        Self { passes: plan.passes.iter().map(pass).collect(), queued: [0; QUEUES as usize], samples: 0, waves: 0 }
-    }
-
-    fn add_times(&mut self, times: &[(&'static str, f64)]) {
-        for (name, ms) in times {
-            if !self.passes.iter().any(|pass| pass.name == *name) {
-                self.passes.push(report::Pass { name, ..Default::default() });
-            }
-            if let Some(pass) = self.passes.iter_mut().find(|pass| pass.name == *name) {
-                pass.dispatches += 1;
-                pass.ms += ms;
-            }
-        }
-    }
-
-    fn add_counters(&mut self, counters: &[u32]) {
-        for (queue, total) in self.queued.iter_mut().enumerate() {
-            *total += u64::from(counters[COUNTER_TOTAL as usize + queue]);
-        }
-    }
-
-    fn outcome(&self, view: &View, plan: &Plan) -> Outcome {
-        let mut passes = self.passes.clone();
-        let pixels = u64::from(view.width) * u64::from(view.height);
-        let primary = pixels * self.samples;
-        let queued = |queue: u32| self.queued[queue as usize];
-        let (shadow, reflection) = (queued(QUEUE_SHADOW), queued(QUEUE_REFLECTION));
-        for pass in &mut passes {
-            pass.items = match pass.name {
-                "primary" => primary,
-                "shade" => self.queued[QUEUE_HIT as usize] * u64::from(plan.lights),
-                "shadow" => shadow,
-                "reflection" => reflection,
-                "retrace" => Again::QUEUES.into_iter().map(queued).sum(),
-                "resolve" => pixels * self.waves,
-                _ => pass.dispatches,
-            };
-        }
-        let rays = report::Rays { primary, shadow, reflection };
-        Outcome { passes, rays, queue_bytes: plan.queue_bytes() }
-    }
 }

@@ -8,6 +8,7 @@ mod progressive;
 pub mod ray_sets;
 mod subtrees;
 mod textures;
+mod totals;
 mod trace;
 mod tracers;
 mod tree;

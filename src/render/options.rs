@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::scene::{Background, CameraChoice, Filter, Instancing, Sampler, Scene, Soup, View};
 use crate::vulkan::DeviceChoice;
 use glam::DVec3;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -119,6 +119,17 @@ impl Options {
             2..8 => Quality::Balanced,
             _ => Quality::Best,
         })
+    }
+
+    /// Whether to go on.
+    ///
+    /// # Errors
+    /// `Interrupted` when not.
+    pub fn go_on(&self) -> Result<()> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        Ok(())
     }
 
     /// Refuses a scene of too many triangles, before anything is made of them.

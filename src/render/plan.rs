@@ -125,11 +125,6 @@ impl Plan {
         self.bands() * u64::from(samples.div_ceil(self.wave_samples))
     }
 
-    /// Dispatches in a wave, without those that trace rays again.
-    pub fn dispatches_of_a_wave(&self, samples: u32) -> u64 {
-        self.passes.iter().map(|pass| pass.dispatches).sum::<u64>() / self.waves(samples)
-    }
-
     /// Bands that the picture is made in.
     pub(super) fn bands(&self) -> u64 {
         self.padded_pixels.div_ceil(u64::from(self.band_pixels))

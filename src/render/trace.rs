@@ -120,11 +120,9 @@ impl Tracer<'_> {
         let mut trace = Trace { met: Vec::new(), wall_ms: Vec::new(), device_ms: Vec::new() };
         let mut run = 0;
         while run <= runs {
-            if options.interrupted.load(std::sync::atomic::Ordering::Relaxed) {
-                return Err(Error::Interrupted);
-            }
+            options.go_on()?;
             self.fill(&input)?;
-            let (wall, device) = self.run(kind, rays.len() as u32)?;
+            let (wall, device) = self.run(kind, rays.len() as u32, options)?;
             let counters = upload::read_back(self.frame.renderer, self.frame.buffer(binding::COUNTERS))?;
             let counters: &[u32] = bytemuck::cast_slice(counters.read()?);
             if self.frame.must_run_again(counters)? {
@@ -158,31 +156,32 @@ impl Tracer<'_> {
     }
 
     /// One timed submission: wall-clock and device milliseconds.
-    fn run(&self, kind: SetKind, rays: u32) -> Result<(f64, f64)> {
+    fn run(&self, kind: SetKind, rays: u32, options: &Options) -> Result<(f64, f64)> {
         let Frame { renderer, kernels: Kernels { trace, .. }, bindings, .. } = &self.frame;
         let wave = Step { pixels: rays, samples: 1, finish: 1, ..Step::default() };
         let start = Instant::now();
         let mut commands = Commands::new(&renderer.device, 4)?;
         commands.bind(&trace.primary, bindings);
-        let mut from_queue = |kernel: &Option<Arc<Kernel>>, queue: u32| {
+        let mut from_queue = |kernel: &Option<Arc<Kernel>>, queue: u32| -> Result<()> {
             if let Some(kernel) = kernel {
-                self.frame.prepare(&mut commands, &[queue]);
+                self.frame.prepare(&mut commands, &[queue], options)?;
                 let arguments = self.frame.buffer(binding::DISPATCHES);
                 commands.dispatch_indirect(kernel, bytemuck::bytes_of(&wave), arguments, queue.into());
             }
+            Ok(())
         };
         match kind {
             SetKind::Primary => {
                 commands.dispatch(&trace.primary, bytemuck::bytes_of(&wave), rays.div_ceil(WORKGROUP));
-                self.frame.trace_again(&mut commands, wave, QUEUE_PRIMARY_AGAIN);
+                self.frame.trace_again(&mut commands, wave, QUEUE_PRIMARY_AGAIN, options)?;
             }
             SetKind::Shadow => {
-                from_queue(&trace.shadow, QUEUE_SHADOW);
-                self.frame.trace_again(&mut commands, wave, QUEUE_SHADOW_AGAIN);
+                from_queue(&trace.shadow, QUEUE_SHADOW)?;
+                self.frame.trace_again(&mut commands, wave, QUEUE_SHADOW_AGAIN, options)?;
             }
             SetKind::Mirror | SetKind::Diffuse => {
-                from_queue(&trace.reflection, QUEUE_REFLECTION);
-                self.frame.trace_again(&mut commands, wave, QUEUE_REFLECTION_AGAIN);
+                from_queue(&trace.reflection, QUEUE_REFLECTION)?;
+                self.frame.trace_again(&mut commands, wave, QUEUE_REFLECTION_AGAIN, options)?;
             }
         }
         // Queues, radiance, counters: kernels wrote, copies of the next submission read.

@@ -178,9 +178,7 @@ impl Stress<'_> {
 
     /// Judges one value of a parameter and writes its row. A device that cannot compute it does not hold.
     fn row(&mut self, parameter: &str, value: f64, find: impl FnOnce(&Self) -> Result<Finding>) -> Result<()> {
-        if self.options.interrupted.load(std::sync::atomic::Ordering::Relaxed) {
-            return Err(Error::Interrupted);
-        }
+        self.options.go_on()?;
         let start = Instant::now();
         let (finding, note) = match find(self) {
             Ok(finding) => (finding, String::new()),

@@ -8,7 +8,6 @@ use crate::report::study::{Measured, Series, Study};
 use crate::report::{log_log_slope, Spread};
 use crate::scene::{Filter, Sampler, Scene, MAX_SAMPLES};
 use std::fmt::{Display, Formatter};
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// One setting of one knob.
@@ -240,9 +239,7 @@ fn measure(
     let mut rays = 0;
     // One more than counts, so that nothing is compiled in a measurement.
     for repeat in 0..=plan.repeats {
-        if options.interrupted.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
-        }
+        options.go_on()?;
         let own = Options { seed: options.seed.wrapping_add(repeat), progress: None, ..options.clone() };
         prepared.view.seed = own.seed;
         let start = Instant::now();

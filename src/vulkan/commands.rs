@@ -1,4 +1,4 @@
-//! Recording: bind, push, dispatch, barrier, timestamp; then submit and wait.
+//! Recording: bind, push, dispatch, barrier, timestamp; then submit and wait, at once or in parts.
 
 use super::device::lock;
 use super::{failed, Bindings, Buffer, Device, Kernel};
@@ -47,21 +47,25 @@ impl Access {
     }
 }
 
-/// A command buffer that is recorded, submitted once, and waited for.
+/// A command buffer that is recorded, submitted and waited for; in several parts where that takes long.
 pub struct Commands {
     device: Arc<Device>,
     pool: vk::CommandPool,
     buffer: vk::CommandBuffer,
     fence: vk::Fence,
     timestamps: vk::QueryPool,
-    /// Name of each dispatch; the end timestamp of the first `most_timed` has the next index.
+    /// What the next part must bind again.
+    bound: Option<(vk::PipelineLayout, vk::DescriptorSet)>,
+    /// Name of each dispatch of this part; the end timestamp of the first `most_timed` has the next index.
     dispatched: Vec<&'static str>,
     most_timed: usize,
     is_submitted: bool,
+    /// Names and milliseconds of the parts before.
+    spans: Vec<(&'static str, f64)>,
 }
 
 impl Commands {
-    /// Begins recording. At most `most_timed` dispatches get a timestamp.
+    /// Begins recording. At most `most_timed` dispatches of each part get a timestamp.
     ///
     /// # Errors
     /// `Vulkan` when the driver refuses.
@@ -74,9 +78,11 @@ impl Commands {
             buffer: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
             timestamps: vk::QueryPool::null(),
+            bound: None,
             dispatched: Vec::new(),
             most_timed,
             is_submitted: false,
+            spans: Vec::new(),
         };
         let raw = &device.raw;
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(device.queue_family);
@@ -92,25 +98,33 @@ impl Commands {
         commands.fence =
             unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }.map_err(failed("create fence"))?;
         device.set_name(commands.fence, "commands done");
-        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the command buffer is fresh.
-        unsafe { raw.begin_command_buffer(commands.buffer, &begin) }.map_err(failed("begin commands"))?;
         if most_timed > 0 {
-            commands.begin_timestamps()?;
+            let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP);
+            let info = info.query_count(commands.timestamp_count());
+            // SAFETY: the queue has timestamps.
+            commands.timestamps =
+                unsafe { raw.create_query_pool(&info, None) }.map_err(failed("create timestamp pool"))?;
+            device.set_name(commands.timestamps, "timestamps");
         }
+        commands.begin()?;
         Ok(commands)
     }
 
-    fn begin_timestamps(&mut self) -> Result<()> {
-        let count = self.most_timed as u32 + 1;
-        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count);
-        // SAFETY: the queue has timestamps.
-        self.timestamps =
-            unsafe { self.device.raw.create_query_pool(&info, None) }.map_err(failed("create timestamp pool"))?;
-        self.device.set_name(self.timestamps, "timestamps");
-        // SAFETY: recording; all queries of the pool.
-        unsafe { self.device.raw.cmd_reset_query_pool(self.buffer, self.timestamps, 0, count) };
-        self.write_timestamp(0);
+    fn timestamp_count(&self) -> u32 {
+        self.most_timed as u32 + 1
+    }
+
+    fn begin(&self) -> Result<()> {
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the command buffer is fresh, or its pool was reset.
+        unsafe { self.device.raw.begin_command_buffer(self.buffer, &begin) }.map_err(failed("begin commands"))?;
+        if self.most_timed > 0 {
+            let count = self.timestamp_count();
+            // SAFETY: recording; all queries of the pool.
+            unsafe { self.device.raw.cmd_reset_query_pool(self.buffer, self.timestamps, 0, count) };
+            self.write_timestamp(0);
+        }
+        self.bind_again();
         Ok(())
     }
 
@@ -122,10 +136,16 @@ impl Commands {
 
     /// Makes all slots visible to the dispatches that follow.
     pub fn bind(&mut self, kernel: &Kernel, bindings: &Bindings) {
-        let point = vk::PipelineBindPoint::COMPUTE;
-        let (layout, sets) = (kernel.layout(), [bindings.set]);
-        // SAFETY: recording; set and pipeline layout are of the same Layout.
-        unsafe { self.device.raw.cmd_bind_descriptor_sets(self.buffer, point, layout, 0, &sets, &[]) };
+        self.bound = Some((kernel.layout(), bindings.set));
+        self.bind_again();
+    }
+
+    fn bind_again(&self) {
+        if let Some((layout, set)) = self.bound {
+            let point = vk::PipelineBindPoint::COMPUTE;
+            // SAFETY: recording; set and pipeline layout are of the same Layout, and alive until the commands were waited for.
+            unsafe { self.device.raw.cmd_bind_descriptor_sets(self.buffer, point, layout, 0, &[set], &[]) };
+        }
     }
 
     /// Runs `groups` workgroups.
@@ -191,6 +211,31 @@ impl Commands {
         unsafe { self.device.raw.cmd_copy_buffer(self.buffer, from.raw, to.raw, &region) };
     }
 
+    /// Dispatches recorded since the last [`Self::flush`].
+    pub fn dispatches(&self) -> usize {
+        self.dispatched.len()
+    }
+
+    /// Runs what was recorded, waits, and goes on recording. A barrier must follow, as it would between dispatches.
+    ///
+    /// # Errors
+    /// As [`Self::submit_and_wait`].
+    pub fn flush(&mut self) -> Result<()> {
+        self.submit()?;
+        self.wait()?;
+        self.is_submitted = false;
+        let raw = &self.device.raw;
+        // SAFETY: the commands were waited for.
+        unsafe { raw.reset_fences(&[self.fence]) }.map_err(failed("reset fence"))?;
+        let spans = self.read_timestamps()?;
+        self.spans.extend(spans);
+        self.dispatched.clear();
+        let flags = vk::CommandPoolResetFlags::empty();
+        // SAFETY: as above; the buffer is the only one of its pool.
+        unsafe { self.device.raw.reset_command_pool(self.pool, flags) }.map_err(failed("reset commands"))?;
+        self.begin()
+    }
+
     /// Runs what was recorded, waits, and returns each dispatch's name and milliseconds, in order; 0 where it was not timed.
     ///
     /// # Errors
@@ -204,6 +249,15 @@ impl Commands {
     /// # Errors
     /// As [`Self::submit_and_wait`].
     pub fn submit_and_wait_beside(mut self, host_work: impl FnOnce()) -> Result<Vec<(&'static str, f64)>> {
+        self.submit()?;
+        host_work();
+        self.wait()?;
+        let last = self.read_timestamps()?;
+        self.spans.extend(last);
+        Ok(std::mem::take(&mut self.spans))
+    }
+
+    fn submit(&mut self) -> Result<()> {
         let raw = &self.device.raw;
         // SAFETY: recording, and ended once.
         unsafe { raw.end_command_buffer(self.buffer) }.map_err(failed("end commands"))?;
@@ -215,9 +269,7 @@ impl Commands {
             unsafe { raw.queue_submit(*queue, &submit, self.fence) }.map_err(failed("submit"))?;
         }
         self.is_submitted = true;
-        host_work();
-        self.wait()?;
-        self.read_timestamps()
+        Ok(())
     }
 
     fn wait(&self) -> Result<()> {
