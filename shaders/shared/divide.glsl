@@ -3,8 +3,8 @@
 
 /// Quotient and remainder of a value below 2²⁴.
 uvec2 divide(uint value, uint divisor) {
-    // Rounded to nearest or a little worse, the quotient is off by at most one.
-    uint quotient = uint(float(value) / float(divisor));
+    // Rounded to nearest or a little worse, the quotient is off by at most one. Signed numbers are converted by one instruction.
+    uint quotient = uint(int(float(int(value)) / float(int(divisor))));
     uint rest = value - quotient * divisor;
     if (int(rest) < 0) {
         quotient -= 1u;

@@ -30,9 +30,9 @@ struct GridRay {
 GridRay grid_ray(Ray ray, vec3 grid_origin, vec3 grid_scale) {
     // A zero component would make 0 · ∞ = NaN and drop a box; 1e-20 stays finite on any grid.
     vec3 direction = mix(ray.direction, vec3(1e-20), lessThan(abs(ray.direction), vec3(1e-20)));
-    vec3 inverse = 1.0 / (direction * grid_scale);
-    return GridRay(((ray.origin - grid_origin) * grid_scale - GRID_MIDDLE) * GRID_PARTS, inverse / GRID_PARTS,
-                   abs(inverse) * GRID_REACH);
+    vec3 inverse = (1.0 / GRID_PARTS) / (direction * grid_scale);
+    return GridRay(((ray.origin - grid_origin) * grid_scale - GRID_MIDDLE) * GRID_PARTS, inverse,
+                   abs(inverse) * (GRID_PARTS * GRID_REACH));
 }
 
 /// Three bits for a child: IS_CHILD and its place among its siblings.

@@ -10,6 +10,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Texel buffers smaller than this push a software device to storage buffers: SwiftShader offers 65 536 texels.
 const ENOUGH_TEXELS: u32 = 1 << 26;
+/// Texels of a buffer that kernels tell apart: as many as Mesa's software Vulkan offers, see FETCH in shaders/shared/bindings.glsl.
+const MOST_TEXELS: u32 = 1 << 27;
 /// So do fewer storage texel buffers in a kernel than there are slots.
 const ENOUGH_TEXEL_BUFFERS: u32 = 32;
 
@@ -64,7 +66,7 @@ pub struct DeviceInfo {
     pub kind: DeviceKind,
     /// Invocations in a subgroup; nothing depends on it.
     pub subgroup_size: u32,
-    /// Most `uvec4` texels in a texel buffer.
+    /// Most texels in a texel buffer.
     pub max_texels: u32,
     /// Most storage texel buffers that a kernel can see.
     pub max_texel_buffers: u32,
@@ -297,7 +299,7 @@ fn describe(instance: &Instance, physical: vk::PhysicalDevice) -> DeviceInfo {
             _ => DeviceKind::Other,
         },
         subgroup_size: subgroup.subgroup_size,
-        max_texels: core.limits.max_texel_buffer_elements,
+        max_texels: core.limits.max_texel_buffer_elements.min(MOST_TEXELS),
         max_texel_buffers: core
             .limits
             .max_per_stage_descriptor_storage_images
