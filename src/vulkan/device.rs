@@ -362,3 +362,14 @@ fn choose(infos: &[DeviceInfo], choice: &DeviceChoice) -> Result<usize> {
         None => Ok(index),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kernels_tell_as_many_texels_apart_as_buffers_may_have() {
+        let fetch = format!("#define FETCH(name, index) imageLoad(name, int((index) & {:#x}u))", MOST_TEXELS - 1);
+        assert!(include_str!("../../shaders/shared/bindings.glsl").contains(&fetch), "{fetch}");
+    }
+}
