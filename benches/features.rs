@@ -6,6 +6,7 @@
 
 use glam::{DMat4, DVec3, Vec4};
 use glimt::scene::{shapes, AlphaMode, Background, CameraChoice, Instance, Instancing, Light, Material, Mesh, Whitted};
+use glimt::vulkan::Habits;
 use glimt::{Options, Renderer, Scene};
 
 /// Frames of which the median is told.
@@ -89,7 +90,9 @@ fn main() {
     println!("| feature needed | device bytes | of this queues | dispatches | render ms | first dispatches, ms |");
     println!("|---|---|---|---|---|---|");
     for (name, scene, options) in rows() {
-        let renderer = Renderer::new(&options.device, false).unwrap();
+        // Each at its own first dispatch, so that their times can be told.
+        let habits = Habits { compile_ahead: Some(false), ..Habits::default() };
+        let renderer = Renderer::with_habits(&options.device, false, habits).unwrap();
         let first = renderer.render(&scene, &Options { size: (8, 8), ..options.clone() }).unwrap().1;
         let mut reports: Vec<_> = (0..FRAMES).map(|_| renderer.render(&scene, &options).unwrap().1).collect();
         let ms = |report: &glimt::report::Report| report.passes.iter().map(|pass| pass.ms).sum::<f64>();

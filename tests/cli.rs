@@ -139,6 +139,9 @@ fn a_picture_its_report_and_its_formats() {
         "/times_ms/render",
         "/times_ms/save",
         "/times_ms/total",
+        "/compiled_ahead/kernels",
+        "/compiled_ahead/on_twins",
+        "/compiled_ahead/ms",
         "/memory_bytes/device_peak",
         "/memory_bytes/queues",
     ] {

@@ -21,12 +21,14 @@
 //! * `batch` — JSON jobs in, answers and pictures out, in one process: order, faults, limits, line by line
 //! * `test_models` — models that show whether they are drawn right, against what they looked like
 //! * `broken` — the validator's broken files, what the fuzzer found, random changes: an error or a scene, never a panic
+//! * `ahead` — kernels that several devices compile at the same time
 //! * `vulkan` — commands that are in flight when the host panics
 //! * `corpus` — real files, golden silhouettes (skipped where the corpus is absent, demanded when CI=true)
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, clippy::print_stderr)]
 
 mod account;
+mod ahead;
 mod architecture;
 mod batch;
 mod broken;

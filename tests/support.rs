@@ -21,7 +21,7 @@ pub fn renderer() -> &'static Renderer {
 /// The same device, fetching from storage buffers and uploading through staging buffers, as others do.
 pub fn storage_renderer() -> &'static Renderer {
     static RENDERER: OnceLock<Renderer> = OnceLock::new();
-    let habits = Habits { fetch: Some(Fetch::Storage), staged: Some(true) };
+    let habits = Habits { fetch: Some(Fetch::Storage), staged: Some(true), ..Habits::default() };
     RENDERER.get_or_init(|| Renderer::with_habits(&DeviceChoice::Best, true, habits).expect("a Vulkan device"))
 }
 

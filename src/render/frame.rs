@@ -202,12 +202,12 @@ impl<'a> Frame<'a> {
     /// `Device` when it would not help.
     pub fn must_run_again(&mut self, counters: &[u32]) -> Result<bool> {
         let is_filled = |queue: &u32| counters[(COUNTER_FILLING + queue) as usize] != 0;
-        let mut filled = Again::QUEUES.into_iter().filter(is_filled).peekable();
-        if filled.peek().is_some() {
+        let filled: Vec<_> = Again::QUEUES.into_iter().filter(is_filled).collect();
+        if !filled.is_empty() {
             if self.again.is_empty() {
                 self.make_partial_hits()?;
             }
-            filled.try_for_each(|queue| self.again.make(self.renderer, queue, self.plan.features))?;
+            self.again.make(self.renderer, &filled, self.plan.features)?;
             return Ok(true);
         }
         let lost = counters[COUNTER_LOST as usize];

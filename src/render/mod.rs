@@ -22,10 +22,14 @@ pub use tree::{Rebase, Tree, TreeSize};
 use crate::bvh::Quality;
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::layout::{binding, BindingKind, Features, KernelCode, RayItem, Step};
+use crate::layout::{binding, kernels, BindingKind, Features, KernelCode, RayItem, Step};
 use crate::report::{self, Report};
 use crate::scene::{Scene, Soup, View};
-use crate::vulkan::{BindingSlot, Cache, Device, DeviceChoice, Fetch, Habits, Instance, Kernel, Layout, SlotKind};
+use crate::vulkan::{
+    Ahead, BindingSlot, Cache, Compiled, Device, DeviceChoice, Fetch, Habits, Instance, Kernel, Layout, SlotKind,
+    Source,
+};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -49,6 +53,9 @@ pub struct Renderer {
     device: Arc<Device>,
     layout: Arc<Layout>,
     cache: Cache,
+    /// The same for all features.
+    prepare: Arc<Kernel>,
+    ahead: Ahead,
     /// Compiled kernels by name and features: a second pipeline of the same code would be compiled again. Scenes of all kinds have
     /// some dozen sets of features; [`MOST_KERNELS`] bounds what a long life may gather.
     kernels: Mutex<HashMap<(&'static str, Features), Arc<Kernel>>>,
@@ -156,8 +163,13 @@ impl Renderer {
             })
             .collect();
         let layout = Layout::new(&device, &slots, size_of::<Step>() as u32)?;
+        let cache = Cache::open(&device, &kernels::CODE_HASH.to_le_bytes());
+        let prepare = source(&device, &kernels::PREPARE, Features::default());
+        let kernel = Arc::new(Kernel::new(&layout, &cache, &prepare)?);
         Ok(Self {
-            cache: Cache::open(&device, &crate::layout::kernels::CODE_HASH.to_le_bytes()),
+            ahead: Ahead::new(&kernel, prepare),
+            prepare: kernel,
+            cache,
             device,
             layout,
             kernels: Mutex::default(),
@@ -171,27 +183,36 @@ impl Renderer {
         &self.device
     }
 
-    /// The kernel with these features, compiled once.
-    fn kernel(&self, code: &KernelCode, features: Features) -> Result<Arc<Kernel>> {
+    /// Makes kernels with these features, side by side, as far as they are not there yet.
+    fn make_kernels(&self, codes: &[&KernelCode], features: Features) -> Result<Compiled> {
         let kernels = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kernel) = kernels().get(&(code.name, features)) {
-            return Ok(kernel.clone());
-        }
-        let spirv = match self.device.fetch {
-            Fetch::Texel => code.texel_fetch,
-            Fetch::Storage => code.storage_fetch,
+        let is_missing = |code: &&KernelCode| !kernels().contains_key(&(code.name, features));
+        let missing: Vec<_> = codes.iter().copied().filter(is_missing).collect();
+        let make = |code: &&KernelCode| {
+            let source = source(&self.device, code, features);
+            let kernel = Arc::new(Kernel::new(&self.layout, &self.cache, &source)?);
+            Ok((kernel, source))
         };
-        let spirv = spirv.with(features);
-        let constants = features.list().map(|(_, on)| on);
-        let name = if features.retrace { "retrace" } else { code.name };
-        let kernel = Arc::new(Kernel::new(&self.layout, &self.cache, name, spirv, &constants)?);
-        let mut kernels = kernels();
-        if kernels.len() >= MOST_KERNELS {
+        let made = missing.par_iter().map(make).collect::<Result<Vec<_>>>()?;
+        if kernels().len() >= MOST_KERNELS {
             // Frames hold on to those they use.
-            kernels.clear();
+            kernels().clear();
         }
-        kernels.insert((code.name, features), kernel.clone());
-        Ok(kernel)
+        let named = missing.iter().zip(&made).map(|(code, (kernel, _))| ((code.name, features), kernel.clone()));
+        kernels().extend(named);
+        Ok(self.ahead.compile(made))
+    }
+
+    /// The kernel with these features, made once.
+    fn kernel(&self, code: &KernelCode, features: Features) -> Result<Arc<Kernel>> {
+        loop {
+            let kernels = self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(kernel) = kernels.get(&(code.name, features)) {
+                return Ok(kernel.clone());
+            }
+            drop(kernels);
+            self.make_kernels(&[code], features)?;
+        }
     }
 
     /// Renders a scene on this device.
@@ -250,6 +271,7 @@ impl Renderer {
             upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase, textures: &textures };
         let mut frame = frame::Frame::new(self, view, on_device, plan, Box::new(|| tree.in_parts(soup)))?;
         let upload = milliseconds(start);
+        let compiled = frame.kernels.compiled;
         let start = Instant::now();
         let (film, convergence) = if progressive::is_wanted(options) {
             let (film, convergence) = progressive::run(&mut frame, view, options)?;
@@ -280,11 +302,26 @@ impl Renderer {
             rays: outcome.rays,
             convergence,
             bvh: tree.report(),
+            compiled_ahead: report::CompiledAhead {
+                kernels: compiled.kernels,
+                on_twins: compiled.on_twins,
+                ms: compiled.time.as_secs_f64() * 1e3,
+            },
             times_ms: report::Times { device: self.opened_in_ms, upload, render, ..Default::default() },
             memory_bytes: report::Memory { device_peak: self.device.peak_memory(), queues: outcome.queue_bytes },
         };
         Ok((film, report))
     }
+}
+
+/// A kernel with these features, as this device fetches.
+fn source(device: &Device, code: &KernelCode, features: Features) -> Source {
+    let spirv = match device.fetch {
+        Fetch::Texel => code.texel_fetch,
+        Fetch::Storage => code.storage_fetch,
+    };
+    let name = if features.retrace { "retrace" } else { code.name };
+    Source { name, spirv: spirv.with(features), constants: features.list().map(|(_, on)| on).to_vec() }
 }
 
 /// The scene's part of a report.

@@ -3,7 +3,7 @@
 use super::Renderer;
 use crate::error::Result;
 use crate::layout::{kernels, Features, KernelCode, QUEUE_PRIMARY_AGAIN, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW_AGAIN};
-use crate::vulkan::Kernel;
+use crate::vulkan::{Compiled, Kernel};
 use std::sync::Arc;
 
 /// The kernels that trace rays, as far as the frame has such rays.
@@ -19,24 +19,30 @@ pub(super) struct Kernels {
     pub prepare: Arc<Kernel>,
     pub shade: Arc<Kernel>,
     pub resolve: Arc<Kernel>,
+    /// Those that were compiled ahead.
+    pub compiled: Compiled,
 }
 
 impl Kernels {
-    /// Makes them side by side.
+    /// Makes them.
     pub fn new(renderer: &Renderer, features: Features) -> Result<Self> {
+        let shadow = features.shadows.then_some(&kernels::SHADOW);
+        let reflection = features.rays_go_on().then_some(&kernels::REFLECTION);
+        let always = [&kernels::PRIMARY, &kernels::SHADE, &kernels::RESOLVE];
+        let all: Vec<_> = always.into_iter().chain(shadow).chain(reflection).collect();
+        let compiled = renderer.make_kernels(&all, features)?;
         let kernel = |code| renderer.kernel(code, features);
-        let (trace, rest) = rayon::join(
-            || -> Result<_> {
-                Ok(Tracers {
-                    primary: kernel(&kernels::PRIMARY)?,
-                    shadow: features.shadows.then(|| kernel(&kernels::SHADOW)).transpose()?,
-                    reflection: features.rays_go_on().then(|| kernel(&kernels::REFLECTION)).transpose()?,
-                })
+        Ok(Self {
+            trace: Tracers {
+                primary: kernel(&kernels::PRIMARY)?,
+                shadow: shadow.map(kernel).transpose()?,
+                reflection: reflection.map(kernel).transpose()?,
             },
-            || -> Result<_> { Ok([kernel(&kernels::PREPARE)?, kernel(&kernels::SHADE)?, kernel(&kernels::RESOLVE)?]) },
-        );
-        let [prepare, shade, resolve] = rest?;
-        Ok(Self { trace: trace?, prepare, shade, resolve })
+            prepare: renderer.prepare.clone(),
+            shade: kernel(&kernels::SHADE)?,
+            resolve: kernel(&kernels::RESOLVE)?,
+            compiled,
+        })
     }
 }
 
@@ -57,10 +63,12 @@ impl Again {
     /// The queues.
     pub const QUEUES: [u32; QUEUES.len()] = [QUEUES[0].0, QUEUES[1].0, QUEUES[2].0];
 
-    /// Makes the kernel of a queue.
-    pub fn make(&mut self, renderer: &Renderer, queue: u32, features: Features) -> Result<()> {
+    /// Makes the kernels of some queues.
+    pub fn make(&mut self, renderer: &Renderer, queues: &[u32], features: Features) -> Result<()> {
         let features = Features { retrace: true, ..features };
-        for (own, (_, code)) in self.kernels.iter_mut().zip(QUEUES).filter(|(_, (own, _))| *own == queue) {
+        let codes = QUEUES.iter().filter(|(queue, _)| queues.contains(queue)).map(|(_, code)| *code);
+        renderer.make_kernels(&codes.collect::<Vec<_>>(), features)?;
+        for (own, (_, code)) in self.kernels.iter_mut().zip(QUEUES).filter(|(_, (queue, _))| queues.contains(queue)) {
             *own = Some(renderer.kernel(code, features)?);
         }
         Ok(())

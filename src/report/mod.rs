@@ -39,6 +39,8 @@ pub struct Report {
     pub bvh: Tree,
     /// Wall-clock milliseconds.
     pub times_ms: Times,
+    /// Kernels compiled before their first dispatch.
+    pub compiled_ahead: CompiledAhead,
     /// Bytes on the device.
     pub memory_bytes: Memory,
 }
@@ -172,12 +174,23 @@ pub struct Times {
     pub device: f64,
     /// Buffers and kernels.
     pub upload: f64,
-    /// From the first dispatch to the last pixel read back; contains the driver's compilation.
+    /// From the first dispatch to the last pixel read back; contains what the driver compiles then.
     pub render: f64,
     /// Encoding and writing.
     pub save: f64,
     /// Everything, from the start of the process, or the end of the frame before.
     pub total: f64,
+}
+
+/// Kernels compiled before their first dispatch, side by side: none where the driver has them on disk or is better at it.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct CompiledAhead {
+    /// How many.
+    pub kernels: usize,
+    /// Of these, on twins of the device.
+    pub on_twins: usize,
+    /// Milliseconds, a part of `times_ms.upload`.
+    pub ms: f64,
 }
 
 /// Bytes on the device.
@@ -193,6 +206,9 @@ impl Report {
     /// A few lines for people.
     pub fn text(&self) -> String {
         let ms = |value: f64| format!("{value:.0} ms");
+        let CompiledAhead { kernels, ms: compiling, .. } = self.compiled_ahead;
+        let compiling =
+            if kernels > 0 { format!(" (compiling {kernels} kernels: {})", ms(compiling)) } else { String::new() };
         let rays = self.rays.primary + self.rays.shadow + self.rays.reflection;
         let mut lines = vec![
             format!("{} × {} pixels on {}", self.image.width, self.image.height, self.device.name),
@@ -201,7 +217,7 @@ impl Report {
                 self.scene.triangles, self.scene.lights, self.rays.primary, self.rays.shadow, self.rays.reflection
             ),
             format!(
-                "load {}, tree {}, device {}, upload {}, render {}, save {}; total {}",
+                "load {}, tree {}, device {}, upload {}{compiling}, render {}, save {}; total {}",
                 ms(self.times_ms.load),
                 ms(self.times_ms.bvh),
                 ms(self.times_ms.device),

@@ -44,6 +44,7 @@ pub struct Layout {
     pub(super) device: Arc<Device>,
     pub(super) set: vk::DescriptorSetLayout,
     pub(super) pipeline: vk::PipelineLayout,
+    pub(super) push_bytes: u32,
     slots: Vec<BindingSlot>,
 }
 
@@ -74,8 +75,13 @@ impl Layout {
         // SAFETY: a valid description; owned by the struct below.
         let set = unsafe { device.raw.create_descriptor_set_layout(&info, None) }
             .map_err(failed("create descriptor set layout"))?;
-        let mut layout =
-            Self { device: device.clone(), set, pipeline: vk::PipelineLayout::null(), slots: slots.to_vec() };
+        let mut layout = Self {
+            device: device.clone(),
+            set,
+            pipeline: vk::PipelineLayout::null(),
+            push_bytes,
+            slots: slots.to_vec(),
+        };
         let sets = [set];
         let push = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(push_bytes)];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&push);
@@ -85,6 +91,16 @@ impl Layout {
         device.set_name(layout.set, "bindings");
         device.set_name(layout.pipeline, "kernels");
         Ok(Arc::new(layout))
+    }
+
+    /// The same for a twin of the device.
+    pub(super) fn of_twin(&self) -> Result<Arc<Self>> {
+        Self::new(&self.device.twin()?, &self.slots, self.push_bytes)
+    }
+
+    /// How a slot is reached.
+    pub(super) fn kind(&self, slot: u32) -> SlotKind {
+        self.slots[slot as usize].kind
     }
 }
 

@@ -37,6 +37,11 @@ impl Cache {
         Self { device: device.clone(), path: path.filter(|_| created.is_ok()), raw, loaded: data.len() }
     }
 
+    /// A cache that holds nothing and is never written.
+    pub(super) fn empty(device: &Arc<Device>) -> Self {
+        Self { device: device.clone(), raw: vk::PipelineCache::null(), path: None, loaded: 0 }
+    }
+
     /// Writes the file as a whole, so that two processes may do so at once; the last one wins.
     fn save(&self, path: &Path) -> Option<()> {
         // SAFETY: the cache is alive, and nobody compiles any more.

@@ -136,7 +136,7 @@ impl Commands {
 
     /// Makes all slots visible to the dispatches that follow.
     pub fn bind(&mut self, kernel: &Kernel, bindings: &Bindings) {
-        self.bound = Some((kernel.layout(), bindings.set));
+        self.bound = Some((kernel.layout.pipeline, bindings.set));
         self.bind_again();
     }
 
@@ -177,7 +177,7 @@ impl Commands {
         unsafe { self.device.raw.cmd_bind_pipeline(self.buffer, point, kernel.raw) };
         let stage = vk::ShaderStageFlags::COMPUTE;
         // SAFETY: recording; the bytes are exactly the layout's push constants.
-        unsafe { self.device.raw.cmd_push_constants(self.buffer, kernel.layout(), stage, 0, push) };
+        unsafe { self.device.raw.cmd_push_constants(self.buffer, kernel.layout.pipeline, stage, 0, push) };
         dispatch(self);
         self.dispatched.push(kernel.name);
         if self.dispatched.len() <= self.most_timed {

@@ -106,8 +106,11 @@ pub struct Device {
     pub fetch: Fetch,
     /// What tells this device and driver from others whose compiled kernels do not fit.
     identity: [u8; 28],
+    physical: vk::PhysicalDevice,
     /// Uploads go through a staging buffer, because the host does not see the device's memory.
     pub(super) staged: bool,
+    /// Kernels may be compiled ahead of their first dispatch.
+    pub(super) compiles_ahead: bool,
     /// The instance, for its validation messages.
     pub instance: Arc<Instance>,
 }
@@ -119,6 +122,8 @@ pub struct Habits {
     pub fetch: Option<Fetch>,
     /// Uploads through a staging buffer.
     pub staged: Option<bool>,
+    /// Kernels are compiled ahead of their first dispatch, if a trial shows that this helps.
+    pub compile_ahead: Option<bool>,
 }
 
 /// Bytes of device memory that buffers hold.
@@ -209,13 +214,22 @@ impl Device {
             memory: Mutex::default(),
             fetch: habits.fetch.unwrap_or(suitable),
             staged: habits.staged.unwrap_or(info.kind == DeviceKind::Discrete),
+            // Validation is not about speed, and the layers of 1.3.239 do not stand every use of several threads.
+            compiles_ahead: habits.compile_ahead.unwrap_or(info.kind == DeviceKind::Cpu && !instance.is_validating()),
             identity,
+            physical,
             info,
             instance: instance.clone(),
         });
         device.set_name(device.raw.handle(), "glimt");
         device.set_name(queue, "compute");
         Ok(device)
+    }
+
+    /// The same physical device opened once more.
+    pub(super) fn twin(&self) -> Result<Arc<Self>> {
+        let habits = Habits { fetch: Some(self.fetch), staged: Some(self.staged), compile_ahead: Some(false) };
+        Self::open_physical(&self.instance, self.physical, self.info.clone(), habits)
     }
 
     /// From now on the peak is that of what follows.

@@ -82,6 +82,11 @@ impl Instance {
         Ok((utils, messenger))
     }
 
+    /// Whether validation layers are on.
+    pub(super) fn is_validating(&self) -> bool {
+        self.messenger.is_some()
+    }
+
     /// What the validation layers have said so far.
     pub fn messages(&self) -> Vec<String> {
         self.messages.lock().map(|messages| messages.clone()).unwrap_or_default()

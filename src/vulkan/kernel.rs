@@ -5,26 +5,32 @@ use crate::error::{Error, Result};
 use ash::vk;
 use std::sync::Arc;
 
+/// What a kernel is made of.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Name of kernel, pass, timing row and debug label.
+    pub name: &'static str,
+    /// Its code.
+    pub spirv: &'static [u8],
+    /// Boolean specialization constants 0, 1, 2, ….
+    pub constants: Vec<bool>,
+}
+
 /// A compiled kernel.
 pub struct Kernel {
-    layout: Arc<Layout>,
+    pub(super) layout: Arc<Layout>,
     pub(super) raw: vk::Pipeline,
     /// Name of kernel, pass, timing row and debug label.
     pub name: &'static str,
 }
 
 impl Kernel {
-    /// Makes the pipeline with boolean specialization constants 0, 1, 2, ….
+    /// Makes the pipeline.
     ///
     /// # Errors
     /// `Device` when the bytes are no SPIR-V; `Vulkan` when the driver refuses.
-    pub fn new(
-        layout: &Arc<Layout>,
-        cache: &Cache,
-        name: &'static str,
-        spirv: &[u8],
-        constants: &[bool],
-    ) -> Result<Self> {
+    pub fn new(layout: &Arc<Layout>, cache: &Cache, source: &Source) -> Result<Self> {
+        let Source { name, spirv, constants } = source;
         let device = &layout.device;
         let code = ash::util::read_spv(&mut std::io::Cursor::new(spirv))
             .map_err(|error| Error::Device(format!("kernel {name}: {error}")))?;
@@ -51,10 +57,6 @@ impl Kernel {
         let raw = created.map_err(|(_, result)| failed(format!("compile kernel {name}"))(result))?[0];
         device.set_name(raw, name);
         Ok(Self { layout: layout.clone(), raw, name })
-    }
-
-    pub(super) fn layout(&self) -> vk::PipelineLayout {
-        self.layout.pipeline
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Instance ─ Device ─┬─ Buffer (memory by gpu-allocator, texel view)
-//!                    ├─ Kernel (pipeline, out of a Cache) ─ Layout (descriptor set layout, push constants)
+//!                    ├─ Kernel (pipeline, out of a Cache, compiled Ahead) ─ Layout (descriptor set layout, push constants)
 //!                    ├─ Bindings (descriptor set)
 //!                    └─ Commands (record: label, bind, dispatch, barrier, timestamp → submit and wait)
 //! ```
@@ -11,6 +11,7 @@
 
 #![allow(unsafe_code)]
 
+mod ahead;
 mod bindings;
 mod buffer;
 mod cache;
@@ -20,6 +21,7 @@ mod huge_pages;
 mod instance;
 mod kernel;
 
+pub use ahead::{Ahead, Compiled};
 pub use bindings::{BindingSlot, Bindings, Layout, SlotKind};
 pub use buffer::{Buffer, Memory, Usage};
 pub use cache::Cache;
@@ -27,7 +29,7 @@ pub use commands::{Access, Commands};
 pub use device::{Device, DeviceChoice, DeviceInfo, DeviceKind, Fetch, Habits};
 pub use huge_pages::HugePages;
 pub use instance::Instance;
-pub use kernel::Kernel;
+pub use kernel::{Kernel, Source};
 
 use crate::error::Error;
 
