@@ -11,7 +11,7 @@ use crate::layout::{
     QUEUE_REFLECTION, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW, QUEUE_SHADOW_AGAIN, TILE, WORKGROUP,
 };
 use crate::scene::{Background, View};
-use crate::vulkan::{Access, Bindings, Buffer, Commands, Memory, Usage};
+use crate::vulkan::{Access, Bindings, Buffer, Commands, Kernel, Memory, Usage};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -23,6 +23,8 @@ pub(super) struct Frame<'a> {
     pub kernels: Kernels,
     /// Traces again what overflowed or was uncertain.
     again: Again,
+    /// Queues of such rays of which it is known whether the first pass left anything in them.
+    asked: Vec<u32>,
     /// Subtrees that tracing again walks through one by one: the whole tree, unless that is too much for one dispatch.
     parts: Vec<Subtree>,
     /// What to do then; `None` when it was done.
@@ -79,6 +81,7 @@ impl<'a> Frame<'a> {
             view,
             kernels,
             again: Again::default(),
+            asked: Vec::new(),
             parts: vec![Subtree::default()],
             smaller_parts: Some(smaller_parts),
             totals: Totals::new(&plan),
@@ -95,10 +98,9 @@ impl<'a> Frame<'a> {
     }
 
     /// Records one wave: the whole algorithm.
-    fn record(&self, commands: &mut Commands, wave: Step, options: &Options) -> Result<()> {
+    fn record(&mut self, commands: &mut Commands, wave: Step, options: &Options) -> Result<()> {
         let Plan { rounds, lights, .. } = self.plan;
-        let Tracers { primary, shadow, reflection } = &self.kernels.trace;
-        let arguments = self.buffer(binding::DISPATCHES);
+        let Tracers { primary, shadow, reflection } = &self.kernels.trace.clone();
         let samples = wave.pixels * wave.samples;
 
         commands.clear(self.buffer(binding::COUNTERS));
@@ -122,7 +124,7 @@ impl<'a> Frame<'a> {
                     round,
                     ..wave
                 };
-                commands.dispatch_indirect(&self.kernels.shade, bytemuck::bytes_of(&step), arguments, QUEUE_HIT.into());
+                self.dispatch_queue(commands, &self.kernels.shade, step, QUEUE_HIT);
                 match (shadow.is_some(), reflect) {
                     (true, true) => self.prepare(commands, &[QUEUE_SHADOW, QUEUE_REFLECTION], options)?,
                     (true, false) => self.prepare(commands, &[QUEUE_SHADOW], options)?,
@@ -130,14 +132,14 @@ impl<'a> Frame<'a> {
                     (false, false) => {}
                 }
                 if let Some(shadow) = shadow {
-                    commands.dispatch_indirect(shadow, bytemuck::bytes_of(&wave), arguments, QUEUE_SHADOW.into());
+                    self.dispatch_queue(commands, shadow, wave, QUEUE_SHADOW);
                     self.trace_again(commands, wave, QUEUE_SHADOW_AGAIN, options)?;
                     // Radiance and shadow queue: this light's shadow rays before the next pass on the same samples.
                     commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
                 }
             }
             if let (Some(reflection), true) = (reflection, goes_on) {
-                commands.dispatch_indirect(reflection, bytemuck::bytes_of(&wave), arguments, QUEUE_REFLECTION.into());
+                self.dispatch_queue(commands, reflection, wave, QUEUE_REFLECTION);
                 self.trace_again(commands, wave, QUEUE_REFLECTION_AGAIN, options)?;
             }
         }
@@ -164,7 +166,13 @@ impl<'a> Frame<'a> {
             return Ok(());
         }
         commands.flush()?;
+        commands.bind(&self.kernels.trace.primary, &self.bindings);
         options.go_on()
+    }
+
+    /// Runs a kernel for all items that are ready in a queue.
+    pub fn dispatch_queue(&self, commands: &mut Commands, kernel: &Kernel, step: Step, queue: u32) {
+        commands.dispatch_indirect(kernel, bytemuck::bytes_of(&step), self.buffer(binding::DISPATCHES), queue.into());
     }
 
     /// Makes filled queues ready, with a barrier on either side.
@@ -179,20 +187,49 @@ impl<'a> Frame<'a> {
         Ok(())
     }
 
-    /// Traces again what the pass before left in `queue`, once it is known that it leaves anything.
-    pub fn trace_again(&self, commands: &mut Commands, wave: Step, queue: u32, options: &Options) -> Result<()> {
+    /// Traces again what the pass before left in `queue`. After the first such pass it is looked whether that is anything, before the passes that
+    /// build on it are recorded; what only later ones leave makes [`Self::must_run_again`].
+    pub fn trace_again(&mut self, commands: &mut Commands, wave: Step, queue: u32, options: &Options) -> Result<()> {
+        if !self.asked.contains(&queue) {
+            self.asked.push(queue);
+            self.ask(commands, wave, queue)?;
+        }
         let Some(kernel) = self.again.kernel(queue) else { return Ok(()) };
         self.prepare(commands, &[queue], options)?;
-        let arguments = self.buffer(binding::DISPATCHES);
         for (index, Subtree { root, below }) in self.parts.iter().copied().enumerate() {
             let (first_part, last_part) = (u32::from(index == 0), u32::from(index + 1 == self.parts.len()));
             let step = Step { root, below, first_part, last_part, ..wave };
-            commands.dispatch_indirect(kernel, bytemuck::bytes_of(&step), arguments, queue.into());
+            self.dispatch_queue(commands, kernel, step, queue);
             self.breathe(commands, options)?;
             // Partial hits: this part wrote, the next reads.
             commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
         }
         Ok(())
+    }
+
+    /// Runs what is recorded, and makes the kernel that traces a queue's rays again if there are any.
+    fn ask(&mut self, commands: &mut Commands, wave: Step, queue: u32) -> Result<()> {
+        let read_back = self.read_back(wave.first_pixel.into());
+        // Counters: the pass wrote, the copy reads.
+        commands.barrier(Access::ShaderWrite, Access::Transfer);
+        commands.copy(self.buffer(binding::COUNTERS), read_back, 0, COUNTER_BYTES as u64);
+        // What was read back: the copy wrote, the host reads.
+        commands.barrier(Access::Transfer, Access::HostRead);
+        commands.flush()?;
+        let counters: &[u32] = bytemuck::cast_slice(&read_back.read()?[..4 * COUNTERS as usize]);
+        if counters[(COUNTER_FILLING + queue) as usize] != 0 {
+            self.make_again(&[queue])?;
+        }
+        commands.bind(&self.kernels.trace.primary, &self.bindings);
+        Ok(())
+    }
+
+    /// Makes kernels that trace the rays in some queues again, and what they need.
+    fn make_again(&mut self, queues: &[u32]) -> Result<()> {
+        if self.again.is_empty() {
+            self.make_partial_hits()?;
+        }
+        self.again.make(self.renderer, queues, self.plan.features)
     }
 
     /// Whether a pass left rays that nobody traced again, or they were cut short again: the wave is worth nothing and must be run
@@ -204,10 +241,7 @@ impl<'a> Frame<'a> {
         let is_filled = |queue: &u32| counters[(COUNTER_FILLING + queue) as usize] != 0;
         let filled: Vec<_> = Again::QUEUES.into_iter().filter(is_filled).collect();
         if !filled.is_empty() {
-            if self.again.is_empty() {
-                self.make_partial_hits()?;
-            }
-            self.again.make(self.renderer, &filled, self.plan.features)?;
+            self.make_again(&filled)?;
             return Ok(true);
         }
         let lost = counters[COUNTER_LOST as usize];

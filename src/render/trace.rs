@@ -4,7 +4,7 @@
 use super::frame::Frame;
 use super::ray_sets::{BenchRay, SetKind};
 use super::textures::Textures;
-use super::tracers::Kernels;
+use super::tracers::Tracers;
 use super::{upload, Options, Plan, Rebase, Renderer};
 use crate::error::{Error, Result};
 use crate::layout::{
@@ -12,9 +12,9 @@ use crate::layout::{
     QUEUE_REFLECTION, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW, QUEUE_SHADOW_AGAIN, WORKGROUP,
 };
 use crate::scene::{Scene, View};
-use crate::vulkan::{Access, Buffer, Commands, Kernel, Usage};
+use crate::vulkan::{Access, Buffer, Commands, Usage};
 use glam::{DVec3, Vec3};
-use std::sync::{Arc, MutexGuard, PoisonError};
+use std::sync::{MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// A scene on the device, ready to trace rays.
@@ -156,34 +156,27 @@ impl Tracer<'_> {
     }
 
     /// One timed submission: wall-clock and device milliseconds.
-    fn run(&self, kind: SetKind, rays: u32, options: &Options) -> Result<(f64, f64)> {
-        let Frame { renderer, kernels: Kernels { trace, .. }, bindings, .. } = &self.frame;
+    fn run(&mut self, kind: SetKind, rays: u32, options: &Options) -> Result<(f64, f64)> {
+        let frame = &mut self.frame;
+        let Tracers { primary, shadow, reflection } = &frame.kernels.trace.clone();
         let wave = Step { pixels: rays, samples: 1, finish: 1, ..Step::default() };
         let start = Instant::now();
-        let mut commands = Commands::new(&renderer.device, 4)?;
-        commands.bind(&trace.primary, bindings);
-        let mut from_queue = |kernel: &Option<Arc<Kernel>>, queue: u32| -> Result<()> {
-            if let Some(kernel) = kernel {
-                self.frame.prepare(&mut commands, &[queue], options)?;
-                let arguments = self.frame.buffer(binding::DISPATCHES);
-                commands.dispatch_indirect(kernel, bytemuck::bytes_of(&wave), arguments, queue.into());
-            }
-            Ok(())
-        };
-        match kind {
-            SetKind::Primary => {
-                commands.dispatch(&trace.primary, bytemuck::bytes_of(&wave), rays.div_ceil(WORKGROUP));
-                self.frame.trace_again(&mut commands, wave, QUEUE_PRIMARY_AGAIN, options)?;
-            }
-            SetKind::Shadow => {
-                from_queue(&trace.shadow, QUEUE_SHADOW)?;
-                self.frame.trace_again(&mut commands, wave, QUEUE_SHADOW_AGAIN, options)?;
-            }
+        let mut commands = Commands::new(&frame.renderer.device, 4)?;
+        commands.bind(primary, &frame.bindings);
+        let (from_queue, again) = match kind {
+            SetKind::Primary => (None, QUEUE_PRIMARY_AGAIN),
+            SetKind::Shadow => (shadow.as_ref().map(|kernel| (kernel, QUEUE_SHADOW)), QUEUE_SHADOW_AGAIN),
             SetKind::Mirror | SetKind::Diffuse => {
-                from_queue(&trace.reflection, QUEUE_REFLECTION)?;
-                self.frame.trace_again(&mut commands, wave, QUEUE_REFLECTION_AGAIN, options)?;
+                (reflection.as_ref().map(|kernel| (kernel, QUEUE_REFLECTION)), QUEUE_REFLECTION_AGAIN)
             }
+        };
+        if let Some((kernel, queue)) = from_queue {
+            frame.prepare(&mut commands, &[queue], options)?;
+            frame.dispatch_queue(&mut commands, kernel, wave, queue);
+        } else if kind == SetKind::Primary {
+            commands.dispatch(primary, bytemuck::bytes_of(&wave), rays.div_ceil(WORKGROUP));
         }
+        frame.trace_again(&mut commands, wave, again, options)?;
         // Queues, radiance, counters: kernels wrote, copies of the next submission read.
         commands.barrier(Access::ShaderWrite, Access::Transfer);
         let spans = commands.submit_and_wait()?;

@@ -7,6 +7,7 @@ use crate::vulkan::{Compiled, Kernel};
 use std::sync::Arc;
 
 /// The kernels that trace rays, as far as the frame has such rays.
+#[derive(Clone)]
 pub(super) struct Tracers {
     pub primary: Arc<Kernel>,
     pub shadow: Option<Arc<Kernel>>,

@@ -54,8 +54,6 @@ pub struct Commands {
     buffer: vk::CommandBuffer,
     fence: vk::Fence,
     timestamps: vk::QueryPool,
-    /// What the next part must bind again.
-    bound: Option<(vk::PipelineLayout, vk::DescriptorSet)>,
     /// Name of each dispatch of this part; the end timestamp of the first `most_timed` has the next index.
     dispatched: Vec<&'static str>,
     most_timed: usize,
@@ -78,7 +76,6 @@ impl Commands {
             buffer: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
             timestamps: vk::QueryPool::null(),
-            bound: None,
             dispatched: Vec::new(),
             most_timed,
             is_submitted: false,
@@ -116,7 +113,7 @@ impl Commands {
 
     fn begin(&self) -> Result<()> {
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the command buffer is fresh, or its pool was reset.
+        // SAFETY: the command buffer is fresh.
         unsafe { self.device.raw.begin_command_buffer(self.buffer, &begin) }.map_err(failed("begin commands"))?;
         if self.most_timed > 0 {
             let count = self.timestamp_count();
@@ -124,7 +121,6 @@ impl Commands {
             unsafe { self.device.raw.cmd_reset_query_pool(self.buffer, self.timestamps, 0, count) };
             self.write_timestamp(0);
         }
-        self.bind_again();
         Ok(())
     }
 
@@ -136,16 +132,9 @@ impl Commands {
 
     /// Makes all slots visible to the dispatches that follow.
     pub fn bind(&mut self, kernel: &Kernel, bindings: &Bindings) {
-        self.bound = Some((kernel.layout.pipeline, bindings.set));
-        self.bind_again();
-    }
-
-    fn bind_again(&self) {
-        if let Some((layout, set)) = self.bound {
-            let point = vk::PipelineBindPoint::COMPUTE;
-            // SAFETY: recording; set and pipeline layout are of the same Layout, and alive until the commands were waited for.
-            unsafe { self.device.raw.cmd_bind_descriptor_sets(self.buffer, point, layout, 0, &[set], &[]) };
-        }
+        let (point, layout) = (vk::PipelineBindPoint::COMPUTE, kernel.layout.pipeline);
+        // SAFETY: recording; set and pipeline layout are of the same Layout, and alive until the commands were waited for.
+        unsafe { self.device.raw.cmd_bind_descriptor_sets(self.buffer, point, layout, 0, &[bindings.set], &[]) };
     }
 
     /// Runs `groups` workgroups.
@@ -216,24 +205,15 @@ impl Commands {
         self.dispatched.len()
     }
 
-    /// Runs what was recorded, waits, and goes on recording. A barrier must follow, as it would between dispatches.
+    /// Runs what was recorded, waits, and begins anew: with nothing bound, and with a barrier to follow, as it would between dispatches.
     ///
     /// # Errors
     /// As [`Self::submit_and_wait`].
     pub fn flush(&mut self) -> Result<()> {
-        self.submit()?;
-        self.wait()?;
-        self.is_submitted = false;
-        let raw = &self.device.raw;
-        // SAFETY: the commands were waited for.
-        unsafe { raw.reset_fences(&[self.fence]) }.map_err(failed("reset fence"))?;
-        let spans = self.read_timestamps()?;
-        self.spans.extend(spans);
-        self.dispatched.clear();
-        let flags = vk::CommandPoolResetFlags::empty();
-        // SAFETY: as above; the buffer is the only one of its pool.
-        unsafe { self.device.raw.reset_command_pool(self.pool, flags) }.map_err(failed("reset commands"))?;
-        self.begin()
+        let mut fresh = Self::new(&self.device, self.most_timed)?;
+        std::mem::swap(self, &mut fresh);
+        self.spans = fresh.submit_and_wait()?;
+        Ok(())
     }
 
     /// Runs what was recorded, waits, and returns each dispatch's name and milliseconds, in order; 0 where it was not timed.
