@@ -67,7 +67,7 @@ impl<'a> Frame<'a> {
             let buffer = filled.unwrap_or_else(|| upload::frame_buffer(renderer, slot.slot, slot.name, planned.bytes));
             buffer.map(|buffer| (slot.slot, buffer))
         });
-        // The driver makes kernels on this thread while others write what they will read.
+        // Kernels are made while other threads write what they will read.
         let (kernels, buffers) =
             rayon::join(|| Kernels::new(renderer, features), || buffers.collect::<Result<BTreeMap<_, _>>>());
         let (kernels, buffers) = (kernels?, buffers?);

@@ -39,7 +39,7 @@ pub struct Report {
     pub bvh: Tree,
     /// Wall-clock milliseconds.
     pub times_ms: Times,
-    /// Kernels compiled before their first dispatch.
+    /// Kernels compiled before the frame's first dispatch.
     pub compiled_ahead: CompiledAhead,
     /// Bytes on the device.
     pub memory_bytes: Memory,
@@ -182,7 +182,7 @@ pub struct Times {
     pub total: f64,
 }
 
-/// Kernels compiled before their first dispatch, side by side: none where the driver has them on disk or is better at it.
+/// Kernels compiled before the frame's first dispatch, side by side: none where the driver seems to have them on disk, or is better at it.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct CompiledAhead {
     /// How many.

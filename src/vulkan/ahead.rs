@@ -67,15 +67,15 @@ impl Ahead {
         }
         // The longest first, so that nobody is left with one of them at the end.
         kernels.sort_by_key(|(_, source)| Reverse(source.spirv.len()));
-        let (next, on_twins) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let [next, on_twins, on_device] = [const { AtomicUsize::new(0) }; 3];
         let take = || kernels.get(next.fetch_add(1, Ordering::Relaxed));
-        let on_twin = || -> Result<()> {
+        let compile_on_twin = || -> Result<()> {
             let layout = self.layout.of_twin()?;
             let (cache, nothing) = (Cache::empty(&layout.device), Nothing::new(&layout)?);
             let dispatch = |source| nothing.dispatch(&Kernel::new(&layout, &cache, source)?);
             let finds_small = |pause: &Duration| {
                 thread::sleep(*pause);
-                dispatch(&self.small).is_ok_and(|time| time < small / 2)
+                dispatch(&self.small).is_ok_and(|time| time < COMPILED.min(small / 2))
             };
             if PAUSES.iter().any(finds_small) {
                 while let Some((_, source)) = take() {
@@ -86,21 +86,23 @@ impl Ahead {
             }
             Ok(())
         };
-        let on_device = || -> Result<()> {
+        let compile_here = || -> Result<()> {
             let nothing = Nothing::new(&self.layout)?;
             while let Some((kernel, _)) = take() {
                 nothing.dispatch(kernel)?;
+                on_device.fetch_add(1, Ordering::Relaxed);
             }
             Ok(())
         };
         thread::scope(|threads| {
             for _ in 1..cores().min(kernels.len()) {
                 // One thread fewer is no loss.
-                let _ = thread::Builder::new().spawn_scoped(threads, on_twin);
+                let _ = thread::Builder::new().spawn_scoped(threads, compile_on_twin);
             }
-            let _ = on_device();
+            let _ = compile_here();
         });
-        Compiled { kernels: kernels.len(), on_twins: on_twins.into_inner(), time: start.elapsed() }
+        let on_twins = on_twins.into_inner();
+        Compiled { kernels: on_device.into_inner() + on_twins, on_twins, time: start.elapsed() }
     }
 }
 
@@ -122,8 +124,9 @@ impl Trial {
     }
 }
 
+/// Cores that there are and that may be used.
 fn cores() -> usize {
-    thread::available_parallelism().map_or(1, usize::from)
+    thread::available_parallelism().map_or(1, usize::from).min(rayon::current_num_threads())
 }
 
 /// Something in every slot, for dispatches that do nothing.
