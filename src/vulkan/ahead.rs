@@ -18,9 +18,8 @@ use std::time::{Duration, Instant};
 /// Shorter than this a first dispatch has compiled nothing: a small kernel takes 15 to 40 ms to compile, 1 to 2 from disk.
 const COMPILED: Duration = Duration::from_millis(6);
 
-/// How long a twin sleeps before it looks for the small kernel, and looks again; and, the first, after each kernel: the driver writes to disk when
-/// nobody else wants the core.
-const PAUSES: [Duration; 2] = [Duration::from_millis(3), Duration::from_millis(15)];
+/// How long a twin sleeps before it looks for the small kernel, and after each kernel: the driver writes to disk when nobody else wants the core.
+const PAUSE: Duration = Duration::from_millis(3);
 
 /// Compiles kernels for a device.
 pub struct Ahead {
@@ -73,14 +72,15 @@ impl Ahead {
             let layout = self.layout.of_twin()?;
             let (cache, nothing) = (Cache::empty(&layout.device), Nothing::new(&layout)?);
             let dispatch = |source| nothing.dispatch(&Kernel::new(&layout, &cache, source)?);
-            let finds_small = |pause: &Duration| {
-                thread::sleep(*pause);
+            let finds_small = |pause| {
+                thread::sleep(pause);
                 dispatch(&self.small).is_ok_and(|time| time < COMPILED.min(small / 2))
             };
-            if PAUSES.iter().any(finds_small) {
+            // Where it is not there yet, once more.
+            if [PAUSE, 5 * PAUSE].into_iter().any(finds_small) {
                 while let Some((_, source)) = take() {
                     dispatch(source)?;
-                    thread::sleep(PAUSES[0]);
+                    thread::sleep(PAUSE);
                     on_twins.fetch_add(1, Ordering::Relaxed);
                 }
             }
