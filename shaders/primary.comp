@@ -19,11 +19,10 @@ Ray camera_ray(vec2 point) {
     return Ray(frame.eye + parallel * offset, normalize(frame.forward + (1.0 - parallel) * offset));
 }
 
-/// One thread a pixel sample: camera ray → nearest hit → hit queue, or background. What a hit's sample begins with, shade writes.
-void main() {
-    begin();
-    uint thread = interleaved_thread();
-    uint sample_index = RETRACE ? queue_item(thread, QUEUE_PRIMARY_AGAIN) : thread;
+const uint WAITING = QUEUE_PRIMARY_AGAIN;
+
+/// A pixel sample: camera ray → nearest hit → hit queue, or background. What a hit's sample begins with, shade writes.
+void work(uint index, uint sample_index) {
     uint pixel = sample_index;
     uint sample_of_wave = 0u;
     if (MULTISAMPLING) {
@@ -31,29 +30,26 @@ void main() {
         pixel = divided.x;
         sample_of_wave = divided.y;
     }
-    if (pixel >= step_now.pixels)
-        return;
     uvec2 place = pixel_place(step_now.first_pixel + pixel);
-    if (place.x >= frame.width || place.y >= frame.height)
-        return;
-    vec2 inside = vec2(0.5);
-    if (MULTISAMPLING) {
-        vec2 point = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_of_wave);
-        if (FILTER)
-            point = filtered(point);
-        inside = mix(inside, point, bvec2(frame.samples > 1u));
+    if (place.x < frame.width && place.y < frame.height) {
+        vec2 inside = vec2(0.5);
+        if (MULTISAMPLING) {
+            vec2 point = sample_position(place.y * frame.width + place.x, step_now.first_sample + sample_of_wave);
+            if (FILTER)
+                point = filtered(point);
+            inside = mix(inside, point, bvec2(frame.samples > 1u));
+        }
+        Ray ray = camera_ray(vec2(place) + inside);
+        Hit hit = hit_so_far(index, FAR);
+        if (!traverse(ray, false, hit))
+            trace_again(sample_index, QUEUE_PRIMARY_AGAIN);
+        else if (is_last_part(index, hit)) {
+            if (hit.triangle != NO_TRIANGLE)
+                append_hit(HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, hit.instance));
+            else
+                radiance[sample_index] = vec4(background(ray.direction), frame.background_alpha);
+        }
     }
-
-    Ray ray = camera_ray(vec2(place) + inside);
-    Hit hit = hit_so_far(thread, FAR);
-    if (!traverse(ray, false, hit)) {
-        trace_again(sample_index, QUEUE_PRIMARY_AGAIN);
-        return;
-    }
-    if (!is_last_part(thread, hit))
-        return;
-    if (hit.triangle != NO_TRIANGLE)
-        append_hit(HitItem(sample_index, hit.triangle, hit.barycentrics, ray.direction, hit.instance));
-    else
-        radiance[sample_index] = vec4(background(ray.direction), frame.background_alpha);
 }
+
+#include "shared/main.glsl"

@@ -11,9 +11,10 @@ void main() {
     begin();
     uint pixel = gl_GlobalInvocationID.x;
     // Rays that nobody has traced again: the host runs the wave once more.
-    uint left = counters[COUNTER_FILLING + QUEUE_PRIMARY_AGAIN] | counters[COUNTER_FILLING + QUEUE_SHADOW_AGAIN] |
-                counters[COUNTER_FILLING + QUEUE_REFLECTION_AGAIN];
-    bool is_incomplete = (left | counters[COUNTER_LOST]) != 0u;
+    uint left = counters[COUNTER_FILLING + COUNTER_LINE * QUEUE_PRIMARY_AGAIN] |
+                counters[COUNTER_FILLING + COUNTER_LINE * QUEUE_SHADOW_AGAIN] |
+                counters[COUNTER_FILLING + COUNTER_LINE * QUEUE_REFLECTION_AGAIN];
+    bool is_incomplete = (left | counters[COUNTER_LOST] | counters[COUNTER_CUT]) != 0u;
     if (pixel >= step_now.pixels || is_incomplete)
         return;
     uvec2 place = pixel_place(step_now.first_pixel + pixel);

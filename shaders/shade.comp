@@ -15,16 +15,14 @@ bool here(bool condition, HitItem item) {
     return all(bvec2(condition, item.sample_index != NO_ITEM));
 }
 
-/// One thread a hit: ambient and emission at once; a light → shadow queue; the mirror, or what lies behind → reflection queue. With several
+const uint WAITING = QUEUE_HIT;
+
+/// A hit: ambient and emission at once; a light → shadow queue; the mirror, or what lies behind → reflection queue. With several
 /// lights the pass runs once for each, so that a sample never has two shadow items; the first run adds what needs no light, the
 /// last one makes the ray that goes on, because that changes the throughput. A sample goes on one way only: where light passes a surface, that
 /// mirrors the background and nothing else.
-void main() {
-    begin();
-    uint index = queue_item(interleaved_thread(), QUEUE_HIT);
-    if (index == NO_ITEM)
-        return;
-    HitItem item = hit_item(FETCH(hit_items, index * ITEM_TEXELS), FETCH(hit_items, index * ITEM_TEXELS + 1u));
+void work(uint index, uint place) {
+    HitItem item = hit_item(FETCH(hit_items, place * ITEM_TEXELS), FETCH(hit_items, place * ITEM_TEXELS + 1u));
     vec3 factor = vec3(1.0);
     Way way = Way(1.0, 0u);
     bool from_eye = !here(step_now.round != 0u, item);
@@ -68,3 +66,5 @@ void main() {
     if (SHADOWS)
         queue_shadow_ray(item, factor * alpha, surface, material, light_of(step_now.light));
 }
+
+#include "shared/main.glsl"

@@ -95,6 +95,27 @@ fn rays_that_the_driver_would_cut_short_are_traced_part_by_part() {
 }
 
 #[test]
+fn threads_whose_items_are_too_long_for_them_take_one_each() {
+    // Where the slivers are, eight rays meet 20 000; a thread takes four of a picture of this size, one after the other.
+    let mut mesh =
+        shapes::square([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)].map(|(x, y)| Vec3::new(x, y, -1.0)));
+    mesh.positions.extend([Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1.001, 0.0)]);
+    let camera = look(DVec3::new(0.01, 0.0, 20.0), DVec3::ZERO);
+    let options = Options { size: (128, 128), camera, ..Options::default() };
+    let picture = |slivers: usize| {
+        let mut mesh = mesh.clone();
+        mesh.triangles.extend(std::iter::repeat_n([4, 5, 6], slivers));
+        let scene = scene_of(vec![(mesh, DMat4::IDENTITY, exact(0.25, 0.0, 0.0, 1.0, 0.0))], Vec::new());
+        let (film, report) = draw(&scene, &options);
+        (film, report.passes.iter().find(|pass| pass.name == "primary").map(|pass| pass.dispatches))
+    };
+    let (square, once) = picture(0);
+    let (behind_slivers, twice) = picture(20_000);
+    assert_eq!((once, twice), (Some(1), Some(2)), "the wave is run again");
+    assert!(square == behind_slivers, "no pixel is missing");
+}
+
+#[test]
 fn the_order_of_the_file_does_not_decide_between_copies() {
     let colors = [0.1, 0.3, 0.5, 0.7, 0.9];
     let picture = |order: &[usize]| {

@@ -76,16 +76,32 @@ const uint QUEUE_SHADOW_AGAIN = 4u;
 const uint QUEUE_REFLECTION_AGAIN = 5u;
 /// Number of queues.
 const uint QUEUES = 6u;
-/// First counter of the items that wait in each queue while it is being filled.
+/// Counters from one queue to the next where threads count at the same time: a cache line of its own for each, which processors would otherwise
+/// take from each other.
+const uint COUNTER_LINE = 16u;
+/// First counter of the items that wait at the front of each queue while it is being filled.
 const uint COUNTER_FILLING = 0u;
+/// Likewise at its back.
+const uint COUNTER_FILLING_BACK = 96u;
+/// First counter of the items of each queue that threads have taken; of camera rays it is that of the queue of those that are traced again.
+const uint COUNTER_TAKEN = 192u;
 /// First counter of the items that the pass which empties each queue works on.
-const uint COUNTER_READY = 6u;
+const uint COUNTER_READY = 288u;
+/// First counter of those among them that wait at the front.
+const uint COUNTER_READY_FRONT = 294u;
 /// First counter of the items that each queue has had in all.
-const uint COUNTER_TOTAL = 12u;
+const uint COUNTER_TOTAL = 300u;
 /// Counter of rays whose second traversal was cut short too.
-const uint COUNTER_LOST = 18u;
+const uint COUNTER_LOST = 306u;
+/// Counter of threads that were cut short before their last item.
+const uint COUNTER_CUT = 307u;
 /// Number of counters.
-const uint COUNTERS = 19u;
+const uint COUNTERS = 308u;
+
+/// Most items that a thread takes one after the other, on a device where that pays.
+const uint MOST_A_THREAD = 64u;
+/// Items for each that a thread takes: so many times more workgroups than a processor has threads are left even of small pictures.
+const uint ITEMS_FOR_EACH = 4096u;
 
 /// Steps of the table that a filter's sample positions are read from.
 const uint FILTER_STEPS = 1024u;

@@ -27,9 +27,13 @@
 #include "bindings.glsl"
 layout(local_size_x = WORKGROUP) in;
 
+/// Pixel samples in the wave: a queue's length.
+uint samples_in_wave;
+
 /// What every kernel does first: reads what all threads share. As long as nothing has branched, Mesa's software Vulkan reads such a word once; from
 /// the first branch on once a thread, twenty instructions instead of two.
 void begin() {
     frame = frame_shared;
     step_now = step_now_shared;
+    samples_in_wave = step_now.pixels * step_now.samples;
 }

@@ -75,6 +75,8 @@ struct Step {
     uint reflect;
     /// prepare: bit q set = queue q has been filled and is to be worked on.
     uint queues;
+    /// Most items that a thread takes, see batch.glsl.
+    uint most_a_thread;
     /// shade: number of the round; from 1 on samples have a throughput.
     uint round;
     /// resolve: 1 = divide by the number of samples, the band is complete.

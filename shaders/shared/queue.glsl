@@ -4,13 +4,17 @@
 // own place, and adding to its radiance needs no atomics. Only the queues of rays to be traced again may get more, in a wave that is worth nothing:
 // no pass empties one before the host knows that it is filled.
 
-/// Takes the next free place of a queue: one atomic operation a subgroup.
+/// Takes the next free place of a queue: one atomic operation a subgroup. A queue is filled from both ends, by either half of the workgroups:
+/// software Vulkan gives each half to other threads, which would wait for each other at one counter.
 uint queue_append(uint queue) {
     uvec4 lanes = subgroupBallot(true);
+    bool back = gl_WorkGroupID.x >= gl_NumWorkGroups.x / 2u;
+    uint counter = (back ? COUNTER_FILLING_BACK : COUNTER_FILLING) + COUNTER_LINE * queue;
     uint first = 0u;
     if (gl_SubgroupInvocationID == subgroupBallotFindLSB(lanes))
-        first = atomicAdd(counters[COUNTER_FILLING + queue], subgroupBallotBitCount(lanes));
-    return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(lanes);
+        first = atomicAdd(counters[counter], subgroupBallotBitCount(lanes));
+    uint own = subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(lanes);
+    return back ? samples_in_wave - 1u - own : own;
 }
 
 // Items are written as whole texels: of a struct, and of a part of a vector, software Vulkan writes member by member, each in a loop over
@@ -37,34 +41,13 @@ void append_reflection_ray(RayItem item) {
 /// Leaves a ray, by its place in the queue that it came from, to be traced again. So few are that each takes its own place: to take
 /// one for all of a subgroup costs instructions where no ray is left, too.
 void trace_again(uint place, uint queue) {
-    uint own = atomicAdd(counters[COUNTER_FILLING + queue], 1u);
+    uint own = atomicAdd(counters[COUNTER_FILLING + COUNTER_LINE * queue], 1u);
     if (own < uint(retrace_queue.length()))
         retrace_queue[own] = place;
 }
 
-/// Workgroups that stay neighbours when the grid is interleaved: no divisor or multiple of the tiles in a row of common widths.
-const uint STRETCH = 24u;
-
-/// The number of this thread. Stretches of workgroups take even places first, then odd ones: software Vulkan gives each of its
-/// threads one contiguous part of the grid, and so all get their share of every part of the picture. Neighbours in a stretch
-/// meet the same nodes, and caches still hold them: interleaved one by one, shadow rays took 10 % longer.
-uint interleaved_thread() {
-    uint stretches = gl_NumWorkGroups.x / STRETCH;
-    uint half_count = (stretches + 1u) / 2u;
-    uint own = gl_WorkGroupID.x / STRETCH;
-    uint place = own < half_count ? 2u * own : 2u * (own - half_count) + 1u;
-    // What does not fill a stretch stays where it is.
-    uint stretch = own < stretches ? place : own;
-    return (stretch * STRETCH + gl_WorkGroupID.x % STRETCH) * WORKGROUP + gl_LocalInvocationIndex;
-}
-
-/// The item of a thread, or NO_ITEM when there are fewer. Traced again, it is the place of the one that was left.
-const uint NO_ITEM = 0xffffffffu;
-uint queue_item(uint index, uint queue) {
-    if (index >= counters[COUNTER_READY + queue])
-        return NO_ITEM;
-    return RETRACE ? retrace_queue[index] : index;
-}
+/// A number that no item has.
+const uint NO_ITEM = 0x7fffffffu;
 
 /// Adds light to a pixel sample; the caller holds the sample's only item.
 void add_radiance(uint sample_index, vec3 added) {

@@ -1,5 +1,6 @@
 //! The frame: the order of the passes, wave by wave, and what comes back.
 
+use super::queues::{filling, most_a_thread, workgroups_for};
 use super::subtrees::Subtree;
 use super::totals::{Outcome, Totals};
 use super::tracers::{Again, Kernels, Tracers};
@@ -7,7 +8,7 @@ use super::{upload, Options, Plan, Renderer};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::layout::{
-    binding, Step, COUNTERS, COUNTER_FILLING, COUNTER_LOST, PARTIAL_HIT_TEXELS, QUEUE_HIT, QUEUE_PRIMARY_AGAIN,
+    binding, Step, COUNTERS, COUNTER_CUT, COUNTER_LOST, PARTIAL_HIT_TEXELS, QUEUE_HIT, QUEUE_PRIMARY_AGAIN,
     QUEUE_REFLECTION, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW, QUEUE_SHADOW_AGAIN, TILE, WORKGROUP,
 };
 use crate::scene::{Background, View};
@@ -35,6 +36,8 @@ pub(super) struct Frame<'a> {
     buffers: BTreeMap<u32, Buffer>,
     /// Where the host reads: the counters of a wave, then the film of a band. Bands take turns where there are several.
     read_back: Vec<Buffer>,
+    /// Items that a thread works on one after the other.
+    pub most_a_thread: u32,
     totals: Totals,
 }
 
@@ -84,6 +87,7 @@ impl<'a> Frame<'a> {
             asked: Vec::new(),
             parts: vec![Subtree::default()],
             smaller_parts: Some(smaller_parts),
+            most_a_thread: most_a_thread(renderer.device.info.kind),
             totals: Totals::new(&plan),
             plan,
             bindings,
@@ -107,7 +111,7 @@ impl<'a> Frame<'a> {
         // Counters: the fill wrote, kernels count on.
         commands.barrier(Access::Transfer, Access::ShaderReadWrite);
         commands.bind(primary, &self.bindings);
-        commands.dispatch(primary, bytemuck::bytes_of(&wave), samples.div_ceil(WORKGROUP));
+        commands.dispatch(primary, bytemuck::bytes_of(&wave), workgroups_for(samples, wave.most_a_thread));
         self.trace_again(commands, wave, QUEUE_PRIMARY_AGAIN, options)?;
 
         for round in 0..rounds {
@@ -181,7 +185,11 @@ impl<'a> Frame<'a> {
         let queues = queues.iter().map(|queue| 1 << queue).sum();
         // Queues and counters: the pass before filled them, prepare reads.
         commands.barrier(Access::ShaderWrite, Access::ShaderReadWrite);
-        commands.dispatch(&self.kernels.prepare, bytemuck::bytes_of(&Step { queues, ..Step::default() }), 1);
+        commands.dispatch(
+            &self.kernels.prepare,
+            bytemuck::bytes_of(&Step { queues, most_a_thread: self.most_a_thread, ..Step::default() }),
+            1,
+        );
         // Arguments: prepare wrote, indirect dispatches read them and their kernels the counters.
         commands.barrier(Access::ShaderWrite, Access::ShaderAndIndirect);
         Ok(())
@@ -217,7 +225,7 @@ impl<'a> Frame<'a> {
         commands.barrier(Access::Transfer, Access::HostRead);
         commands.flush()?;
         let counters: &[u32] = bytemuck::cast_slice(&read_back.read()?[..4 * COUNTERS as usize]);
-        if counters[(COUNTER_FILLING + queue) as usize] != 0 {
+        if counters[filling(queue)] != 0 {
             self.make_again(&[queue])?;
         }
         commands.bind(&self.kernels.trace.primary, &self.bindings);
@@ -238,7 +246,12 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// `Device` when it would not help.
     pub fn must_run_again(&mut self, counters: &[u32]) -> Result<bool> {
-        let is_filled = |queue: &u32| counters[(COUNTER_FILLING + queue) as usize] != 0;
+        if counters[COUNTER_CUT as usize] != 0 {
+            // The driver's loops do not allow as many rounds as a thread's items need together.
+            self.most_a_thread = 1;
+            return Ok(true);
+        }
+        let is_filled = |queue: &u32| counters[filling(*queue)] != 0;
         let filled: Vec<_> = Again::QUEUES.into_iter().filter(is_filled).collect();
         if !filled.is_empty() {
             self.make_again(&filled)?;
@@ -325,6 +338,7 @@ impl<'a> Frame<'a> {
         host_work: &mut impl FnMut(&Self) -> Result<()>,
     ) -> Result<bool> {
         options.go_on()?;
+        let wave = Step { most_a_thread: self.most_a_thread, ..wave };
         let mut commands = Commands::new(&self.renderer.device, 2 * MOST_AT_ONCE)?;
         self.record(&mut commands, wave, options)?;
         let mut worked = Ok(());

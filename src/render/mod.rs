@@ -5,6 +5,7 @@ mod next_tree;
 mod options;
 mod plan;
 mod progressive;
+mod queues;
 pub mod ray_sets;
 mod subtrees;
 mod textures;

@@ -2,14 +2,15 @@
 //! queues, filled by the host instead of `shade`.
 
 use super::frame::Frame;
+use super::queues::{filling, filling_back, workgroups_for};
 use super::ray_sets::{BenchRay, SetKind};
 use super::textures::Textures;
 use super::tracers::Tracers;
 use super::{upload, Options, Plan, Rebase, Renderer};
 use crate::error::{Error, Result};
 use crate::layout::{
-    binding, Features, HitItem, RayItem, Step, COUNTERS, COUNTER_FILLING, FAR, QUEUE_HIT, QUEUE_PRIMARY_AGAIN,
-    QUEUE_REFLECTION, QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW, QUEUE_SHADOW_AGAIN, WORKGROUP,
+    binding, Features, HitItem, RayItem, Step, COUNTERS, FAR, QUEUE_HIT, QUEUE_PRIMARY_AGAIN, QUEUE_REFLECTION,
+    QUEUE_REFLECTION_AGAIN, QUEUE_SHADOW, QUEUE_SHADOW_AGAIN,
 };
 use crate::scene::{Scene, View};
 use crate::vulkan::{Access, Buffer, Commands, Usage};
@@ -159,7 +160,7 @@ impl Tracer<'_> {
     fn run(&mut self, kind: SetKind, rays: u32, options: &Options) -> Result<(f64, f64)> {
         let frame = &mut self.frame;
         let Tracers { primary, shadow, reflection } = &frame.kernels.trace.clone();
-        let wave = Step { pixels: rays, samples: 1, finish: 1, ..Step::default() };
+        let wave = Step { pixels: rays, samples: 1, finish: 1, most_a_thread: frame.most_a_thread, ..Step::default() };
         let start = Instant::now();
         let mut commands = Commands::new(&frame.renderer.device, 4)?;
         commands.bind(primary, &frame.bindings);
@@ -174,7 +175,7 @@ impl Tracer<'_> {
             frame.prepare(&mut commands, &[queue], options)?;
             frame.dispatch_queue(&mut commands, kernel, wave, queue);
         } else if kind == SetKind::Primary {
-            commands.dispatch(primary, bytemuck::bytes_of(&wave), rays.div_ceil(WORKGROUP));
+            commands.dispatch(primary, bytemuck::bytes_of(&wave), workgroups_for(rays, wave.most_a_thread));
         }
         frame.trace_again(&mut commands, wave, again, options)?;
         // Queues, radiance, counters: kernels wrote, copies of the next submission read.
@@ -198,10 +199,11 @@ impl Tracer<'_> {
         }
         let counters = read_back(binding::COUNTERS)?;
         let counters: &[u32] = bytemuck::cast_slice(counters.read()?);
-        let hits = counters[(COUNTER_FILLING + QUEUE_HIT) as usize] as usize;
+        let front = counters[filling(QUEUE_HIT)] as usize;
+        let back = counters[filling_back(QUEUE_HIT)] as usize;
         let queue = read_back(binding::HIT_QUEUE)?;
-        let items: &[HitItem] = bytemuck::cast_slice(&queue.read()?[..hits * size_of::<HitItem>()]);
-        for item in items {
+        let items: &[HitItem] = bytemuck::cast_slice(&queue.read()?[..rays.len() * size_of::<HitItem>()]);
+        for item in items[..front].iter().chain(&items[items.len() - back..]) {
             let primitive = self.order[item.triangle as usize];
             let ray = &rays[item.sample_index as usize];
             let corners = self.prepared.soup.positions[primitive as usize];
@@ -240,7 +242,7 @@ impl Input {
         let mut counters = vec![0_u32; COUNTERS as usize];
         let items: Vec<RayItem> = match queue {
             Some((_, queue)) => {
-                counters[(COUNTER_FILLING + queue) as usize] = rays.len() as u32;
+                counters[filling(queue)] = rays.len() as u32;
                 rays.iter().zip(0..).map(item).collect()
             }
             None => Vec::new(),
