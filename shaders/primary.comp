@@ -19,6 +19,7 @@ Ray camera_ray(vec2 point) {
     return Ray(frame.eye + parallel * offset, normalize(frame.forward + (1.0 - parallel) * offset));
 }
 
+/// Camera rays wait in no queue, but are counted with those that are traced again.
 const uint WAITING = QUEUE_PRIMARY_AGAIN;
 
 /// A pixel sample: camera ray → nearest hit → hit queue, or background. What a hit's sample begins with, shade writes.

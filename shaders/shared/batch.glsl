@@ -5,9 +5,9 @@ uint items_a_thread(uint items) {
     return clamp(items / ITEMS_FOR_EACH, 1u, step_now.most_a_thread);
 }
 
-/// Workgroups for so many items. Where threads may take several, some are to spare for those that come to their end sooner.
+/// Workgroups for so many items. Where threads take several, a quarter is to spare: who comes to the end of its share of workgroups sooner takes more.
 uint workgroups_for(uint items, uint each) {
     uint in_workgroup = WORKGROUP * each;
     uint needed = (items + in_workgroup - 1u) / in_workgroup;
-    return needed + (step_now.most_a_thread > 1u ? (needed + 3u) / 4u : 0u);
+    return needed + (each > 1u ? (needed + 3u) / 4u : 0u);
 }

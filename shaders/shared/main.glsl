@@ -1,4 +1,5 @@
-// Last include of a kernel that works on a queue: its main. The kernel says where its items are counted, `WAITING`, and what is done for one, `work`.
+// Last include of a kernel that works on a queue: its main. The kernel says where its items are counted, `WAITING`, and what is done for one,
+// `work(index, place)`: its place in the queue that it came from, and, of an item that is traced again, its index in the retrace queue, too.
 //
 // Persistent threads (Aila and Laine, HPG 2009): the threads of a subgroup take a batch of items from a counter, as many side by side
 // as they are, and work on one after the other. What all share is read once a batch; and who is faster takes more, where software Vulkan

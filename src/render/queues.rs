@@ -13,8 +13,8 @@ pub(super) fn filling_back(queue: u32) -> usize {
     (COUNTER_FILLING_BACK + COUNTER_LINE * queue) as usize
 }
 
-/// Most items that a thread works on one after the other. A processor's few threads find so what all items share in their caches; other devices need
-/// as many threads as there are items.
+/// Most items that a thread works on one after the other: many on a processor, which reads once for all of them what they share. Other devices
+/// want more threads than a picture has rays.
 pub(super) fn most_a_thread(kind: DeviceKind) -> u32 {
     if kind == DeviceKind::Cpu {
         MOST_A_THREAD
@@ -27,5 +27,5 @@ pub(super) fn most_a_thread(kind: DeviceKind) -> u32 {
 pub(super) fn workgroups_for(samples: u32, most_a_thread: u32) -> u32 {
     let each = (samples / ITEMS_FOR_EACH).clamp(1, most_a_thread);
     let needed = samples.div_ceil(WORKGROUP * each);
-    needed + if most_a_thread > 1 { needed.div_ceil(4) } else { 0 }
+    needed + if each > 1 { needed.div_ceil(4) } else { 0 }
 }
