@@ -141,6 +141,21 @@ fn bands_fetching_and_unneeded_features_change_no_pixel() {
 }
 
 #[test]
+fn samples_are_added_in_loops_that_the_driver_does_not_cut_short() {
+    // Where a sample of 20 011 lies is found in four short loops, which the loop over a pixel's samples goes through for each.
+    let options = Options {
+        size: (8, 8),
+        samples: 20_011,
+        sampler: Sampler::Stratified,
+        filter: Filter::Mitchell,
+        ..Options::default()
+    };
+    let picture =
+        |samples_in_flight| draw(&built_in("teapot").unwrap(), &Options { samples_in_flight, ..options.clone() }).0;
+    assert!(picture(u32::MAX) == picture(1 << 14), "all at once is the same as a few at a time");
+}
+
+#[test]
 fn what_a_scene_does_not_need_is_left_out() {
     let passes = |scene: &Scene, options: &Options| -> Vec<&'static str> {
         draw(scene, options).1.passes.iter().map(|pass| pass.name).collect()

@@ -111,7 +111,9 @@ fn threads_whose_items_are_too_long_for_them_take_one_each() {
     };
     let (square, once) = picture(0);
     let (behind_slivers, twice) = picture(20_000);
-    assert_eq!((once, twice), (Some(1), Some(2)), "the wave is run again");
+    // Other drivers let a thread work as long as it takes.
+    let is_cut_short = renderer().device().info.name.contains("llvmpipe");
+    assert_eq!((once, twice), (Some(1), Some(1 + u64::from(is_cut_short))), "the wave is run again");
     assert!(square == behind_slivers, "no pixel is missing");
 }
 

@@ -6,7 +6,7 @@ use std::process::Output;
 #[test]
 fn a_benchmark_and_its_files() {
     let folder = tempfile::tempdir().unwrap();
-    let view = r#"{"eye": [3, 2, 4], "target": [0, 0.5, 0], "up": [0, 1, 0], "vfov_deg": 45, "width": 64, "height": 48,
+    let view = r#"{"eye": [3, 2, 4], "target": [0, 0.5, 0], "up": [0, 1, 0], "vfov_deg": 45, "width": 128, "height": 96,
                    "light_pos": [3, 5, 2], "bbox_min": [-2, 0, -2], "bbox_max": [2, 2, 2], "name": "other keys are ignored"}"#;
     std::fs::write(folder.path().join("view.json"), view).unwrap();
     let bench = |more: &[&str]| {
@@ -20,7 +20,8 @@ fn a_benchmark_and_its_files() {
     let told = json(&bench(&["--export", "rays"]));
     let names: Vec<&str> = told["sets"].as_array().unwrap().iter().map(|set| set["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["primary", "shadow", "mirror", "diffuse"]);
-    assert_eq!(told["sets"][0]["rays"], 64 * 48);
+    // So many that a thread takes several.
+    assert_eq!(told["sets"][0]["rays"], 128 * 96);
     let hits = told["sets"][0]["hits"].as_u64().unwrap();
     for set in &told["sets"].as_array().unwrap()[1..] {
         assert_eq!(set["rays"], hits, "one secondary ray a primary hit: {set}");
@@ -34,7 +35,7 @@ fn a_benchmark_and_its_files() {
     assert!(told["device"]["name"].is_string());
     let size = |name: &str| std::fs::metadata(folder.path().join("rays").join(name)).unwrap().len();
     assert_eq!(size("teapot.bin"), 4 + 36 * told["triangles"].as_u64().unwrap());
-    assert_eq!((size("teapot.shadow.rays"), size("teapot.shadow.ref")), (32 * 64 * 48, 4 * 64 * 48));
+    assert_eq!((size("teapot.shadow.rays"), size("teapot.shadow.ref")), (32 * 128 * 96, 4 * 128 * 96));
 
     // The same rays answered again; then one answer is spoilt.
     let compared = json(&bench(&["--compare", "rays", "--sets", "diffuse,shadow"]));
@@ -50,7 +51,7 @@ fn a_benchmark_and_its_files() {
     assert_eq!(mismatches, serde_json::json!({"count": 1, "missed": 0, "extra": 1, "wrong": 0}));
 
     assert_eq!(bench(&["--compare", "nowhere"]).status.code(), Some(2));
-    std::fs::write(folder.path().join("view.json"), view.replace("\"width\": 64", "\"width\": 60")).unwrap();
+    std::fs::write(folder.path().join("view.json"), view.replace("\"width\": 128", "\"width\": 60")).unwrap();
     let refused = bench(&[]);
     assert!(refused.status.code() == Some(2) && text(&refused.stderr).contains("multiples of 8"));
 }

@@ -56,7 +56,7 @@ STORAGE_BUFFER(13, uvec4, reflection_queue)
 FETCH_VIEW(14, reflection_items, reflection_queue)
 /// Rays to trace again: pixel samples, or places in the queue that they came from.
 STORAGE_BUFFER(15, uint, retrace_queue)
-/// Counts of the queues' items; lost rays.
+/// Counts of what waits in queues and what is taken; of rays that are lost, and threads that were cut short.
 STORAGE_BUFFER(16, uint, counters)
 /// Arguments of the indirect dispatches, one a queue.
 STORAGE_BUFFER(17, Dispatch, dispatches)

@@ -93,14 +93,14 @@ const uint COUNTER_READY_FRONT = 294u;
 const uint COUNTER_TOTAL = 300u;
 /// Counter of rays whose second traversal was cut short too.
 const uint COUNTER_LOST = 306u;
-/// Counter of threads that were cut short before their last item.
+/// Counter of threads that the driver did not allow enough rounds for their batch.
 const uint COUNTER_CUT = 307u;
 /// Number of counters.
 const uint COUNTERS = 308u;
 
 /// Most items that a thread takes one after the other, on a device where that pays.
 const uint MOST_A_THREAD = 64u;
-/// Items for each that a thread takes: so many times more workgroups than a processor has threads are left even of small pictures.
+/// Items for each that a thread takes: so that there are at least 64 workgroups to be shared by a processor's threads.
 const uint ITEMS_FOR_EACH = 4096u;
 
 /// Steps of the table that a filter's sample positions are read from.

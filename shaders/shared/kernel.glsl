@@ -27,7 +27,7 @@
 #include "bindings.glsl"
 layout(local_size_x = WORKGROUP) in;
 
-/// Pixel samples in the wave: a queue's length.
+/// Pixel samples in the wave: where the back ends of queues lie.
 uint samples_in_wave;
 
 /// What every kernel does first: reads what all threads share. As long as nothing has branched, Mesa's software Vulkan reads such a word once; from

@@ -1,5 +1,5 @@
 // Queues: an array of items and counters. A pass fills a queue; `prepare` then makes what was filled ready for the pass that
-// works on it, and the queue may be filled again from its start once that pass is done. One pixel sample has at most one item
+// works on it, and the queue may be filled again once that pass is done. One pixel sample has at most one item
 // in each queue at a time, so a queue as long as the samples in flight cannot overflow, what a sample carries along lies at its
 // own place, and adding to its radiance needs no atomics. Only the queues of rays to be traced again may get more, in a wave that is worth nothing:
 // no pass empties one before the host knows that it is filled.

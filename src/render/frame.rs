@@ -225,7 +225,8 @@ impl<'a> Frame<'a> {
         commands.barrier(Access::Transfer, Access::HostRead);
         commands.flush()?;
         let counters: &[u32] = bytemuck::cast_slice(&read_back.read()?[..4 * COUNTERS as usize]);
-        if counters[filling(queue)] != 0 {
+        // Where threads were cut short the wave is worth nothing, and which rays need it is not known.
+        if counters[filling(queue)] != 0 && counters[COUNTER_CUT as usize] == 0 {
             self.make_again(&[queue])?;
         }
         commands.bind(&self.kernels.trace.primary, &self.bindings);
@@ -240,15 +241,16 @@ impl<'a> Frame<'a> {
         self.again.make(self.renderer, queues, self.plan.features)
     }
 
-    /// Whether a pass left rays that nobody traced again, or they were cut short again: the wave is worth nothing and must be run
-    /// once more.
+    /// Whether threads were cut short, or a pass left rays that nobody traced again, or they were cut short again: the wave is worth nothing and must
+    /// be run once more.
     ///
     /// # Errors
     /// `Device` when it would not help.
     pub fn must_run_again(&mut self, counters: &[u32]) -> Result<bool> {
         if counters[COUNTER_CUT as usize] != 0 {
-            // The driver's loops do not allow as many rounds as a thread's items need together.
+            // The driver's loops do not allow as many rounds as a thread's items need together, here or, likely, in other waves.
             self.most_a_thread = 1;
+            self.asked.clear();
             return Ok(true);
         }
         let is_filled = |queue: &u32| counters[filling(*queue)] != 0;

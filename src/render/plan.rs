@@ -16,6 +16,9 @@ const TEXEL: u64 = 16;
 const PIXEL: u64 = 16;
 /// Largest grid of workgroups that every device allows, as samples.
 const MOST_IN_FLIGHT: u32 = 65_535 * WORKGROUP;
+/// Most samples of a pixel in a wave: `resolve` adds them in a loop, whose rounds and those of what it calls for a sample (where it lies, up to some
+/// twenty) must stay far below the 65 535 that software Vulkan allows.
+const MOST_SAMPLES_A_WAVE: u32 = 1024;
 
 /// A pass of the frame.
 #[derive(Clone, Debug)]
@@ -98,9 +101,10 @@ impl Plan {
         let padded_pixels = tiles * u64::from(TILE * TILE);
         let in_flight = in_flight.clamp(WORKGROUP, MOST_IN_FLIGHT) / WORKGROUP * WORKGROUP;
         // Whole tiles; all samples of a pixel at once if a tile's fit.
-        let band_pixels = (in_flight / view.samples / WORKGROUP * WORKGROUP).max(WORKGROUP);
+        let at_once = view.samples.min(MOST_SAMPLES_A_WAVE);
+        let band_pixels = (in_flight / at_once / WORKGROUP * WORKGROUP).max(WORKGROUP);
         let band_pixels = u64::from(band_pixels).min(padded_pixels) as u32;
-        let wave_samples = (in_flight / band_pixels).min(view.samples);
+        let wave_samples = (in_flight / band_pixels).min(at_once);
         let mut plan = Self {
             features,
             padded_pixels,
