@@ -47,4 +47,4 @@ pub use film::Film;
 pub use render::{render, Options, Renderer};
 pub use report::Report;
 pub use scene::Scene;
-pub use vulkan::HugePages;
+pub use vulkan::{prefer_wide_vectors, HugePages};

@@ -12,8 +12,10 @@ use std::sync::Arc;
 static ALLOCATOR: glimt::HugePages = glimt::HugePages;
 
 fn main() -> ExitCode {
-    let context =
-        cli::Context { started: std::time::Instant::now(), interrupted: Arc::new(AtomicBool::new(false)), print };
+    let started = std::time::Instant::now();
+    // Before there are other threads.
+    glimt::prefer_wide_vectors();
+    let context = cli::Context { started, interrupted: Arc::new(AtomicBool::new(false)), print };
     let command = match cli::Cli::try_parse() {
         Ok(command) => command,
         Err(answer) if !answer.use_stderr() => answer.exit(),

@@ -2,6 +2,7 @@
 
 use glimt::vulkan::{Access, Buffer, Commands, Device, DeviceChoice, Habits, Instance, Memory, Usage};
 use std::panic::{catch_unwind, AssertUnwindSafe};
+use std::process::Command;
 
 /// Long enough that the device is still at it when the host's work has panicked.
 const COPIES: usize = 32;
@@ -24,4 +25,35 @@ fn what_was_submitted_is_waited_for_when_the_hosts_work_panics() {
     assert!(catch_unwind(AssertUnwindSafe(submit)).is_err());
     drop((from, to));
     assert_eq!(instance.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn pictures_do_not_depend_on_how_many_rays_are_traced_side_by_side() {
+    let name = &super::support::renderer().device().info.name;
+    if !name.contains("llvmpipe") {
+        println!("skipped: {name} is not Mesa's software Vulkan");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let picture = |bits: Option<&str>| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
+        command.current_dir(folder.path()).args(["render", "table", "--size", "200x150", "--json"]);
+        command.env_remove("LP_NATIVE_VECTOR_WIDTH").envs(bits.map(|bits| ("LP_NATIVE_VECTOR_WIDTH", bits)));
+        let output = command.output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{bits:?}: {}", super::cli::text(&output.stderr));
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    };
+    let usual = picture(None);
+    println!("as it comes: {}", usual["device"]["name"]);
+    for bits in ["128", "256"] {
+        let report = picture(Some(bits));
+        let name = report["device"]["name"].as_str().unwrap();
+        assert!(name.contains(&format!("{bits} bits")), "what the user has set stands: {name}");
+        assert_eq!(report["image"]["sha256"], usual["image"]["sha256"], "{name}");
+    }
+    // The kernel's word for what the processor has.
+    let Ok(processor) = std::fs::read_to_string("/proc/cpuinfo") else { return };
+    let flags: Vec<&str> = processor.lines().find(|line| line.starts_with("flags")).unwrap_or("").split(' ').collect();
+    let is_wide = ["avx512f", "avx512bw", "avx512dq", "avx512vl", "sse4a"].iter().all(|flag| flags.contains(flag));
+    assert_eq!(usual["device"]["name"].as_str().unwrap().contains("512 bits"), is_wide, "{}", usual["device"]["name"]);
 }

@@ -3,17 +3,13 @@
 // fast as a storage buffer and, because it does not call a function for it, faster than a uniform texel buffer; elsewhere
 // a storage buffer. A kernel is compiled for both. That a texel's number has 27 bits spares software Vulkan an instruction for each thread's
 // address, which it would extend by its sign otherwise: in all a twentieth of a node's visit.
-// A FETCH_VIEW shows a storage buffer that an earlier pass wrote in the same way, FETCH_WORDS a FETCH buffer word by word: FETCH_WORD(name, i).
+// A FETCH_VIEW shows a storage buffer that an earlier pass wrote in the same way.
 #ifdef FETCH_FROM_STORAGE
 #define FETCH_BUFFER(slot, name) layout(set = 0, binding = slot, std430) readonly buffer name##_block { uvec4 name[]; };
 #define FETCH(name, index) name[index]
-#define FETCH_WORDS(slot, name, of) layout(set = 0, binding = slot, std430) readonly buffer name##_block { uint name[]; };
-#define FETCH_WORD(name, index) name[index]
 #else
 #define FETCH_BUFFER(slot, name) layout(set = 0, binding = slot, rgba32ui) uniform readonly restrict uimageBuffer name;
 #define FETCH(name, index) imageLoad(name, int((index) & 0x7ffffffu))
-#define FETCH_WORDS(slot, name, of) layout(set = 0, binding = slot, r32ui) uniform readonly restrict uimageBuffer name;
-#define FETCH_WORD(name, index) imageLoad(name, int(index)).x
 #endif
 #define FETCH_VIEW(slot, name, of) FETCH_BUFFER(slot, name)
 // A texel as floats.
@@ -84,7 +80,5 @@ FETCH_VIEW(27, film_rest_so_far, film_rest)
 FETCH_BUFFER(28, filter_steps)
 /// Tracing again subtree by subtree: what each ray in the retrace queue has hit so far, PARTIAL_HIT_TEXELS each.
 STORAGE_BUFFER(29, uvec4, partial_hits)
-/// The tree, for a child's reference alone.
-FETCH_WORDS(30, node_words, nodes)
 
 PUSH_CONSTANTS(Step, step_now)

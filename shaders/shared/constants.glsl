@@ -7,11 +7,6 @@ const uint WORKGROUP = 64u;
 const uint TILE = 8u;
 /// Hard bound on the depth of the tree, binary or wide: the builder keeps it, the traversal's array stack relies on it.
 const uint MAX_TREE_DEPTH = 64u;
-/// Groups of siblings that the traversal's stack of registers holds.
-const uint STACK_REGISTERS = 10u;
-/// Most nodes of four children in a tree, or in all trees together: a group of siblings has 23 bits for its node, all of them set where an instance was
-/// entered.
-const uint MOST_NODES = 0x7fffffu;
 /// Most triangles in a leaf that its 32-bit reference can name.
 const uint MAX_LEAF_TRIANGLES = 14u;
 /// In place of a leaf's number of triangles: it is an instance.

@@ -15,34 +15,32 @@ layout(constant_id = 4) const bool SHADOWS = true;
 layout(constant_id = 5) const bool REFLECTIONS = true;
 /// More than one sample a pixel: stratified positions.
 layout(constant_id = 6) const bool MULTISAMPLING = true;
-/// The tree is deeper than the traversal's stack: a ray may have to be traced again.
-layout(constant_id = 7) const bool DEEP_TREE = true;
 /// Instances share meshes: an upper tree over instances, whose leaves are trees over the triangles of a mesh.
-layout(constant_id = 8) const bool INSTANCES = true;
+layout(constant_id = 7) const bool INSTANCES = true;
 /// The kernel traces again what overflowed or was uncertain, with a stack as deep as any tree and numbers of two floats: a variant, not a need of the scene.
-layout(constant_id = 9) const bool RETRACE = true;
+layout(constant_id = 8) const bool RETRACE = true;
 /// Sample positions are those of a scrambled Sobol sequence instead of stratified ones.
-layout(constant_id = 10) const bool SOBOL = true;
+layout(constant_id = 9) const bool SOBOL = true;
 /// Sample positions are independent of each other.
-layout(constant_id = 11) const bool INDEPENDENT = true;
+layout(constant_id = 10) const bool INDEPENDENT = true;
 /// Samples are spread as a filter says, not evenly over the pixel.
-layout(constant_id = 12) const bool FILTER = true;
+layout(constant_id = 11) const bool FILTER = true;
 /// Some material has a texture.
-layout(constant_id = 13) const bool TEXTURES = true;
+layout(constant_id = 12) const bool TEXTURES = true;
 /// Some material has a normal map.
-layout(constant_id = 14) const bool NORMAL_MAPS = true;
+layout(constant_id = 13) const bool NORMAL_MAPS = true;
 /// Some triangles are not opaque: traversal looks at alpha.
-layout(constant_id = 15) const bool ALPHA = true;
+layout(constant_id = 14) const bool ALPHA = true;
 /// Some surfaces let light through: rays go on behind them.
-layout(constant_id = 16) const bool LAYERS = true;
+layout(constant_id = 15) const bool LAYERS = true;
 /// Some triangles are so thin that rounding may move hits on them from before a ray's start to behind it.
-layout(constant_id = 17) const bool THIN_TRIANGLES = true;
+layout(constant_id = 16) const bool THIN_TRIANGLES = true;
 
 // Safeguards switched off, one by one, to see what they prevent. Never on in a picture.
 
 /// Rays start a fixed distance off the surface.
-layout(constant_id = 18) const bool FIXED_EPSILON = false;
+layout(constant_id = 17) const bool FIXED_EPSILON = false;
 /// Triangles are tested as Möller and Trumbore do, which lets rays slip through between them.
-layout(constant_id = 19) const bool MOLLER_TRUMBORE = false;
+layout(constant_id = 18) const bool MOLLER_TRUMBORE = false;
 /// Samples are added up without compensation.
-layout(constant_id = 20) const bool PLAIN_SUMS = false;
+layout(constant_id = 19) const bool PLAIN_SUMS = false;

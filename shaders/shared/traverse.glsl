@@ -1,6 +1,5 @@
 // The tree and the walk through it: nodes of four quantised boxes, walked while-while (Aila and Laine, HPG 2009), the
-// nearest child first. What waits on the stack are groups: all of a node's children that are still to be visited are one entry (as in Ylitie,
-// Karras and Laine, HPG 2017). The stack is a shift register: a few variables that move up and down, touched with constant indices
+// nearest child first. The stack is a shift register: a few variables that move up and down, touched with constant indices
 // only, because an indexed array costs software Vulkan eight scalar branches a push. When a live entry falls off its end,
 // the ray goes to the retrace queue, where a variant of the same kernel walks again with an array as deep as the tree can be:
 // rare, and no ray is ever lost. The same happens to a ray that f32 cannot tell whether it hits, and to a walk that the driver
@@ -9,11 +8,14 @@
 // Loops end at their bottom, do … while: Mesa 22.3 runs a loop's body before it asks whether any ray still needs it, so that
 // one that ends at its top makes a round for nothing.
 
-/// No node: the stack is empty.
+/// No node: the bottom of the stack, where a walk is over.
 const int NOTHING = int(0x80000000);
+/// No node either: below the bottom of the stack. A walk comes here if its stack was too small: then the bottom was the first to fall off the end.
+const int LOST = int(0x80000001);
 /// In place of a node: back from an instance to the world.
-const int LEAVE = int(0x80000001);
-const int REGISTERS = int(STACK_REGISTERS);
+const int LEAVE = int(0x80000002);
+/// Nodes that the stack of registers holds, its bottom being one.
+const int REGISTERS = 15;
 /// A node that no tree has. Every loop here also ends at it, see is_complete.
 const int IMPOSSIBLE = 0x7fffffff;
 
@@ -35,92 +37,67 @@ GridRay grid_ray(Ray ray, vec3 grid_origin, vec3 grid_scale) {
                    abs(inverse) * (GRID_PARTS * GRID_REACH));
 }
 
-/// Three bits for a child: IS_CHILD and its place among its siblings.
-const uint CODE_BITS = 3u;
-const uint CODE_MASK = 7u;
-const uint IS_CHILD = 4u;
-const uint PLACE_MASK = 3u;
-/// The key of a child whose box the ray does not enter; its code is 0.
-const int MISSED = 0x7ffffff8;
+/// In place of the distance at which a ray enters a box: it does not.
+const int MISSED = 0x7fffffff;
 
-/// The key of a node's child, by which children are ordered: the bits of the distance at which the ray enters the child's box, something negative if it
-/// starts inside, with the child's code for the last of them; or MISSED. Along an axis a box is a word: as an integer the middle of the box, its last bits a
-/// small float that says how far the box reaches to either side. Neither needs more than one conversion, and which plane is the near one needs
-/// no comparison.
+/// Slab test: the distance at which the ray enters a box, something negative if it starts inside, or MISSED. Along an axis
+/// a box is a word: as an integer the middle of the box, its last bits a small float that says how far the box reaches to either side. Neither needs
+/// more than one conversion, and which plane is the near one needs no comparison.
 ///
 /// Distances are compared as integers, which orders them like floats where they are ≥ 0. Negative ones come before all others, in the wrong
 /// order: of several the largest integer is that of the smallest float. It is no less than that of a far side that is negative, so that a box behind
 /// the ray is missed.
-int key_of(GridRay ray, uvec3 box, uint place, float t_max) {
+int entry_of(GridRay ray, uvec3 box, float t_max) {
     vec3 middle = (vec3(ivec3(box)) - ray.origin) * ray.inverse;
     vec3 reach = uintBitsToFloat((box << REACH_SHIFT & REACH_MASK) | REACH_EXPONENT) * ray.reach_inverse;
     ivec3 near = floatBitsToInt(middle - reach);
     ivec3 far = floatBitsToInt(middle + reach);
     int first = max(near.x, max(near.y, near.z));
     int last = min(min(far.x, far.y), min(far.z, floatBitsToInt(t_max)));
-    return first > last ? MISSED : int((uint(first) & ~CODE_MASK) | IS_CHILD | place);
+    return first > last ? MISSED : first;
 }
 
-/// Two keys in their order.
-void order(inout int nearer, inout int farther) {
-    int least = min(nearer, farther);
-    farther = max(nearer, farther);
-    nearer = least;
+/// A node's child as a ray meets it.
+struct Branch {
+    /// See entry_of.
+    int entry;
+    /// The child's reference.
+    int node;
+};
+
+/// Two branches in their order.
+void order(inout Branch nearer, inout Branch farther) {
+    bool swapped = farther.entry < nearer.entry;
+    Branch first = nearer;
+    nearer = Branch(min(first.entry, farther.entry), swapped ? farther.node : first.node);
+    farther = Branch(max(first.entry, farther.entry), swapped ? first.node : farther.node);
 }
 
-/// The keys of a node's children, in order.
-ivec4 visit(GridRay ray, int node, float t_max) {
+/// A node's children, the nearest first, those that are missed last.
+struct Visit {
+    Branch first;
+    Branch second;
+    Branch third;
+    Branch fourth;
+};
+
+Visit visit(GridRay ray, int node, float t_max) {
     uint texel = uint(node) * NODE_TEXELS;
     // All are fetched before any is tested, so that the processor waits for all at once.
     uvec4 x = FETCH(nodes, texel);
     uvec4 y = FETCH(nodes, texel + 1u);
     uvec4 z = FETCH(nodes, texel + 2u);
-    ivec4 keys = ivec4(key_of(ray, uvec3(x.x, y.x, z.x), 0u, t_max), key_of(ray, uvec3(x.y, y.y, z.y), 1u, t_max),
-                       key_of(ray, uvec3(x.z, y.z, z.z), 2u, t_max), key_of(ray, uvec3(x.w, y.w, z.w), 3u, t_max));
-    order(keys.x, keys.y);
-    order(keys.z, keys.w);
-    order(keys.x, keys.z);
-    order(keys.y, keys.w);
-    order(keys.y, keys.z);
-    return keys;
-}
-
-/// A group of children of one node: the node, then the codes of at most three, the nearest in the lowest bits.
-const uint GROUP_BITS = 3u * CODE_BITS;
-const uint GROUP_MASK = (1u << GROUP_BITS) - 1u;
-/// The group of none.
-const uint NO_GROUP = 0u;
-/// In place of a group where an instance was entered.
-const uint LEAVE_GROUP = MOST_NODES << GROUP_BITS | IS_CHILD;
-
-/// The nearest child of a visited node alone.
-uint nearest_of(int node, ivec4 keys) {
-    return uint(node) << GROUP_BITS | (uint(keys.x) & CODE_MASK);
-}
-
-/// The other children that the ray meets.
-uint others_of(int node, ivec4 keys) {
-    uvec4 codes = uvec4(keys) & CODE_MASK;
-    return uint(node) << GROUP_BITS | codes.w << (2u * CODE_BITS) | codes.z << CODE_BITS | codes.y;
-}
-
-/// The reference of a group's nearest child; NOTHING of an empty one.
-int first_of(uint group) {
-    bool leaves = INSTANCES && group == LEAVE_GROUP;
-    uint node = leaves ? 0u : group >> GROUP_BITS;
-    // The last of a node's texels.
-    uint word = 4u * (NODE_TEXELS * node + NODE_TEXELS - 1u) + (group & PLACE_MASK);
-    int reference = leaves ? LEAVE : int(FETCH_WORD(node_words, word));
-    return (group & IS_CHILD) != 0u ? reference : NOTHING;
-}
-
-/// A group without its nearest child.
-uint rest_of(uint group) {
-    return (group & ~GROUP_MASK) | (group & GROUP_MASK) >> CODE_BITS;
-}
-
-bool is_empty(uint group) {
-    return (group & GROUP_MASK) == 0u;
+    ivec4 references = ivec4(FETCH(nodes, texel + 3u));
+    Visit next = Visit(Branch(entry_of(ray, uvec3(x.x, y.x, z.x), t_max), references.x),
+                       Branch(entry_of(ray, uvec3(x.y, y.y, z.y), t_max), references.y),
+                       Branch(entry_of(ray, uvec3(x.z, y.z, z.z), t_max), references.z),
+                       Branch(entry_of(ray, uvec3(x.w, y.w, z.w), t_max), references.w));
+    order(next.first, next.second);
+    order(next.third, next.fourth);
+    order(next.first, next.third);
+    order(next.second, next.fourth);
+    order(next.second, next.third);
+    return next;
 }
 
 /// Where a walk is: in the world's tree, or, with INSTANCES, in the tree of an instance, with the ray in its space. The ray's
@@ -190,94 +167,98 @@ bool is_complete(int node, bool cut) {
     return node == NOTHING && !cut;
 }
 
-/// The walk through a subtree with an array for a stack, with room for a group on each level of any two trees and the mark between them. The host
+/// The walk through a subtree with an array for a stack, with room for three siblings on each level of any two trees and the mark between them. The host
 /// looks at the count of those that are cut short even so: a wrong picture is never written.
 void traverse_deep(Ray world_ray, bool any, inout Hit hit) {
-    uint stack[2u * MAX_TREE_DEPTH + 1u];
+    int stack[2u * 3u * MAX_TREE_DEPTH + 1u];
     int height = 0;
     Walk walk = begin_walk(world_ray);
     int node = any && hit.triangle != NO_TRIANGLE ? NOTHING : int(step_now.root);
     while (node != NOTHING && node != IMPOSSIBLE) {
         bool found = false;
         if (node >= 0) {
-            ivec4 keys = visit(walk.grid, node, hit.t);
-            if (keys.y != MISSED)
-                stack[height++] = others_of(node, keys);
-            node = first_of(nearest_of(node, keys));
-            if (keys.x != MISSED)
+            Visit next = visit(walk.grid, node, hit.t);
+            if (next.fourth.entry != MISSED)
+                stack[height++] = next.fourth.node;
+            if (next.third.entry != MISSED)
+                stack[height++] = next.third.node;
+            if (next.second.entry != MISSED)
+                stack[height++] = next.second.node;
+            node = next.first.node;
+            if (next.first.entry != MISSED)
                 continue;
         } else if (INSTANCES && node == LEAVE) {
             leave_instance(walk, world_ray);
         } else if (is_instance(node)) {
-            stack[height++] = LEAVE_GROUP;
+            stack[height++] = LEAVE;
             int root = enter_instance(walk, world_ray, node);
             node = step_now.below != 0u ? int(step_now.below) : root;
             continue;
         } else {
             found = visit_leaf(walk, node, any, hit);
         }
-        uint group = height > 0 && !(any && found) ? stack[height - 1] : NO_GROUP;
-        // Of no group it is NOTHING, which ends the walk.
-        node = first_of(group);
-        if (is_empty(rest_of(group)))
-            height--;
-        else
-            stack[height - 1] = rest_of(group);
+        node = height > 0 && !(any && found) ? stack[--height] : NOTHING;
     }
     if (!is_complete(node, walk.cut))
         atomicAdd(counters[COUNTER_LOST], 1u);
 }
 
-/// A stack in registers: the top is entry 0.
+/// A stack in registers: the top is entry 0. Below its last entry, NOTHING, all are LOST.
 struct Stack {
-    uint groups[REGISTERS];
-    /// Not 0 when an entry was lost.
-    uint overflow;
+    int entries[REGISTERS];
 };
 
-/// Here and below selections, no branches: what software Vulkan assigns in a branch it moves twice.
-void push(inout Stack stack, bool pushed, uint group) {
-    if (DEEP_TREE)
-        stack.overflow |= pushed ? stack.groups[REGISTERS - 1] : NO_GROUP;
-    [[unroll]] for (int i = REGISTERS - 1; i > 0; i--)
-        stack.groups[i] = pushed ? stack.groups[i - 1] : stack.groups[i];
-    stack.groups[0] = pushed ? group : stack.groups[0];
+// Here and below conditions are selections, no branches: what software Vulkan assigns in a long branch it moves twice.
+
+/// Moves the entries up by `places`, which is constant.
+void move_up(inout Stack stack, bool is_moved, int places) {
+    [[unroll]] for (int i = REGISTERS - 1; i >= places; i--)
+        stack.entries[i] = is_moved ? stack.entries[i - places] : stack.entries[i];
 }
 
-/// Drops the nearest child of the group at the top, and the group when it was the last.
-void drop_first(inout Stack stack, bool dropped) {
-    uint rest = rest_of(stack.groups[0]);
-    bool popped = dropped && is_empty(rest);
-    stack.groups[0] = dropped ? rest : stack.groups[0];
+/// All but the nearest, the farthest first: in two moves, of two places and of one.
+void push_siblings(inout Stack stack, Visit next) {
+    bool one = next.second.entry != MISSED;
+    bool two = next.third.entry != MISSED;
+    bool three = next.fourth.entry != MISSED;
+    move_up(stack, two, 2);
+    move_up(stack, one && (three || !two), 1);
+    stack.entries[0] = one ? next.second.node : stack.entries[0];
+    stack.entries[1] = two ? next.third.node : stack.entries[1];
+    stack.entries[2] = three ? next.fourth.node : stack.entries[2];
+}
+
+/// The stack without its top.
+void pop(inout Stack stack, bool is_popped) {
     [[unroll]] for (int i = 0; i < REGISTERS - 1; i++)
-        stack.groups[i] = popped ? stack.groups[i + 1] : stack.groups[i];
-    stack.groups[REGISTERS - 1] = popped ? NO_GROUP : stack.groups[REGISTERS - 1];
+        stack.entries[i] = is_popped ? stack.entries[i + 1] : stack.entries[i];
+    stack.entries[REGISTERS - 1] = is_popped ? LOST : stack.entries[REGISTERS - 1];
 }
 
 /// The walk with registers for a stack; false if it is worth nothing: the stack overflowed, the walk was cut short, or a triangle left it uncertain.
 bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
     Walk walk = begin_walk(world_ray);
     Stack stack;
-    stack.overflow = 0u;
-    [[unroll]] for (int i = 0; i < REGISTERS; i++)
-        stack.groups[i] = NO_GROUP;
+    stack.entries[0] = NOTHING;
+    [[unroll]] for (int i = 1; i < REGISTERS; i++)
+        stack.entries[i] = LOST;
     int node = 0;
     do {
         // An inner node, and not IMPOSSIBLE.
         do {
             if (uint(node) < uint(IMPOSSIBLE)) {
-                ivec4 keys = visit(walk.grid, node, hit.t);
-                bool none = keys.x == MISSED;
-                uint group = none ? stack.groups[0] : nearest_of(node, keys);
-                push(stack, keys.y != MISSED, others_of(node, keys));
-                drop_first(stack, none);
-                node = first_of(group);
+                Visit next = visit(walk.grid, node, hit.t);
+                bool none = next.first.entry == MISSED;
+                node = none ? stack.entries[0] : next.first.node;
+                push_siblings(stack, next);
+                pop(stack, none);
             }
         } while (uint(node) < uint(IMPOSSIBLE));
-        if (node >= 0 || node == NOTHING)
+        if (node >= 0 || node <= LOST)
             break;
         if (is_instance(node)) {
-            push(stack, true, LEAVE_GROUP);
+            move_up(stack, true, 1);
+            stack.entries[0] = LEAVE;
             node = enter_instance(walk, world_ray, node);
             continue;
         }
@@ -286,15 +267,14 @@ bool traverse_shallow(Ray world_ray, bool any, inout Hit hit) {
             leave_instance(walk, world_ray);
         else
             found = visit_leaf(walk, node, any, hit);
-        node = first_of(stack.groups[0]);
-        drop_first(stack, true);
+        node = stack.entries[0];
+        pop(stack, true);
         if (any && found) {
             node = NOTHING;
-            stack.overflow = 0u;
             walk.uncertain = false;
         }
-    } while (node != NOTHING);
-    return is_complete(node, walk.cut) && stack.overflow == 0u && !walk.uncertain;
+    } while (node > LOST);
+    return is_complete(node, walk.cut) && !walk.uncertain;
 }
 
 /// Finds the nearest hit, or with `any` some hit, closer than hit.t; a miss leaves hit as it was. False: the ray must be traced

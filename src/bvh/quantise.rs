@@ -173,7 +173,7 @@ mod tests {
             order: vec![0],
             bounds,
             depth: 1,
-            wide: Wide { nodes: vec![[wide(0), wide(1), None, None]], depth: 1, stack: 1 },
+            wide: Wide { nodes: vec![[wide(0), wide(1), None, None]], depth: 1 },
         };
         let quantised = quantise(&bvh, Vec3::ZERO, true, |child| reference(child, 0, 0));
         let [boxes @ .., references] = quantised.nodes[0];

@@ -34,8 +34,6 @@ pub struct Wide {
     pub nodes: Vec<WideNode>,
     /// Levels.
     pub depth: u32,
-    /// Most nodes of which children wait on the stack of a walk.
-    pub stack: u32,
 }
 
 /// The least surface of all wide nodes at and below a binary node that becomes at most 1, 2, … children of a wide node.
@@ -52,23 +50,20 @@ impl Wide {
     /// dynamic programme of Ylitie, Karras and Laine, HPG 2017).
     pub(super) fn of(bvh: &Bvh) -> Self {
         let costs = bvh.forest_costs();
-        let mut wide = Self { nodes: Vec::with_capacity(bvh.nodes.len() / 2), depth: 0, stack: 0 };
-        // Binary nodes that become wide ones, with the wide child that waits for the index, their level and what waits on the
-        // stack of a walk that comes to them.
-        let mut open = vec![(0, None, 1, 0)];
-        while let Some((node, parent, level, waiting)) = open.pop() {
+        let mut wide = Self { nodes: Vec::with_capacity(bvh.nodes.len() / 2), depth: 0 };
+        // Binary nodes that become wide ones, with the wide child that waits for the index, and their level.
+        let mut open = vec![(0, None, 1)];
+        while let Some((node, parent, level)) = open.pop() {
             let index = wide.nodes.len() as u32;
             if let Some((parent, place)) = parent {
                 let child: &mut Option<WideChild> = &mut wide.nodes[parent as usize][place];
                 *child = child.map(|it| WideChild { child: Child::Node(index), ..it });
             }
             let children = bvh.children_of(node, &costs);
-            let waiting = waiting + u32::from(children.iter().flatten().count() > 1);
             wide.depth = wide.depth.max(level);
-            wide.stack = wide.stack.max(waiting);
             for (place, child) in children.into_iter().enumerate().rev() {
                 if let Some(WideChild { child: Child::Node(below), .. }) = child {
-                    open.push((below, Some((index, place)), level + 1, waiting));
+                    open.push((below, Some((index, place)), level + 1));
                 }
             }
             wide.nodes.push(children);
@@ -181,15 +176,13 @@ mod tests {
         Bvh::over_boxes(&boxes, 1)
     }
 
-    /// Levels at and below a wide node, and the most that waits on a stack there.
-    fn deepest(bvh: &Bvh, node: u32) -> (u32, u32) {
-        let children: Vec<Child> = bvh.wide.nodes[node as usize].iter().flatten().map(|wide| wide.child).collect();
-        let below = children.iter().filter_map(|child| match child {
-            Child::Node(below) => Some(deepest(bvh, *below)),
+    /// Levels at and below a wide node.
+    fn levels(bvh: &Bvh, node: u32) -> u32 {
+        let below = bvh.wide.nodes[node as usize].iter().flatten().filter_map(|wide| match wide.child {
+            Child::Node(below) => Some(levels(bvh, below)),
             Child::Leaf { .. } => None,
         });
-        let (levels, waiting) = below.fold((0, 0), |all, one| (all.0.max(one.0), all.1.max(one.1)));
-        (levels + 1, waiting + u32::from(children.len() > 1))
+        below.max().unwrap_or(0) + 1
     }
 
     /// Each primitive is below the root once, in a box that holds it, and each node is met once, after its parent.
@@ -215,7 +208,7 @@ mod tests {
                     }
                 }
             }
-            assert_eq!((bvh.wide.depth, bvh.wide.stack), deepest(&bvh, 0));
+            assert_eq!(bvh.wide.depth, levels(&bvh, 0));
             leaves.sort_unstable();
             assert_eq!(leaves, (0..count as u32).collect::<Vec<_>>());
             assert!(seen[1..].iter().all(|times| *times == 1) && seen[0] == 0, "{seen:?}");

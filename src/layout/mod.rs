@@ -49,8 +49,6 @@ pub mod kernels {
 pub enum BindingKind {
     /// Read-only `uvec4` texels: a storage texel buffer on software Vulkan, a storage buffer elsewhere.
     Fetch,
-    /// The same buffer's 32-bit words.
-    Words,
     /// A storage buffer.
     Storage,
     /// A uniform buffer.

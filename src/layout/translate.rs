@@ -106,10 +106,10 @@ pub fn bindings(source: &str) -> Result<String, Unknown> {
         let arguments: Vec<&str> = arguments.split(", ").collect();
         let (slot, name, kind) = match (kind, arguments[..].as_ref()) {
             ("FETCH_BUFFER", [slot, name]) => (slot, name, "Fetch"),
-            ("FETCH_VIEW" | "FETCH_WORDS", [slot, name, of]) => {
+            ("FETCH_VIEW", [slot, name, of]) => {
                 let number = known.iter().position(|known| known == of)?;
                 view_of = Some(number);
-                (slot, name, if kind == "FETCH_VIEW" { "Fetch" } else { "Words" })
+                (slot, name, "Fetch")
             }
             ("STORAGE_BUFFER", [slot, _, name]) => (slot, name, "Storage"),
             ("UNIFORM_BUFFER", [slot, _, name]) => (slot, name, "Uniform"),

@@ -157,7 +157,6 @@ impl Renderer {
                 slot: binding.slot,
                 kind: match binding.kind {
                     BindingKind::Fetch => SlotKind::Fetch,
-                    BindingKind::Words => SlotKind::Words,
                     BindingKind::Storage => SlotKind::Storage,
                     BindingKind::Uniform => SlotKind::Uniform,
                 },
@@ -266,7 +265,7 @@ impl Renderer {
         self.device.forget_peak_memory();
         let start = Instant::now();
         let textures = textures::Textures::of(scene, features.textures, self.device.fetch_limit())?;
-        let plan = Plan::with_textures(prepared, scene, features, tree.size(), in_flight, &textures)?;
+        let plan = Plan::with_textures(prepared, scene, features, tree.size(), in_flight, &textures);
         let device_tree = tree.for_device(soup, view.camera.eye);
         let on_device =
             upload::Scene { scene, soup, view, tree: &device_tree, rebase: tree.rebase, textures: &textures };

@@ -3,9 +3,9 @@
 
 use super::textures::Textures;
 use super::{Prepared, TreeSize};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::layout::{
-    Features, HitItem, Light, RayItem, Texture, FILTER_STEPS, INSTANCE_TEXELS, MATERIAL_TEXELS, MAX_LAYERS, MOST_NODES,
+    Features, HitItem, Light, RayItem, Texture, FILTER_STEPS, INSTANCE_TEXELS, MATERIAL_TEXELS, MAX_LAYERS,
     NODE_TEXELS, TILE, TRIANGLE_TEXELS, WORKGROUP,
 };
 use crate::scene::{Scene, Soup, View};
@@ -78,10 +78,10 @@ impl Plan {
     /// The plan for a view of a scene with a tree of this size.
     ///
     /// # Errors
-    /// `Content` when its textures or its tree are too large.
+    /// `Content` when its textures are too large.
     pub fn new(prepared: &Prepared, scene: &Scene, features: Features, tree: TreeSize, in_flight: u32) -> Result<Self> {
         let textures = Textures::of(scene, features.textures, u64::MAX)?;
-        Self::with_textures(prepared, scene, features, tree, in_flight, &textures)
+        Ok(Self::with_textures(prepared, scene, features, tree, in_flight, &textures))
     }
 
     /// As [`Plan::new`], with textures that are ready for the device.
@@ -92,11 +92,7 @@ impl Plan {
         tree: TreeSize,
         in_flight: u32,
         textures: &Textures,
-    ) -> Result<Self> {
-        if tree.nodes > MOST_NODES as usize {
-            let why = format!("its tree has {} nodes, at most {MOST_NODES} can be traced; try --bvh fast", tree.nodes);
-            return Err(Error::content(&scene.name, why));
-        }
+    ) -> Self {
         let tiles = u64::from(view.width.div_ceil(TILE)) * u64::from(view.height.div_ceil(TILE));
         let padded_pixels = tiles * u64::from(TILE * TILE);
         let in_flight = in_flight.clamp(WORKGROUP, MOST_IN_FLIGHT) / WORKGROUP * WORKGROUP;
@@ -121,7 +117,7 @@ impl Plan {
         plan.plan_passes(view);
         plan.plan_buffers(scene, soup, view, tree, textures);
         plan.explain_left_out(view);
-        Ok(plan)
+        plan
     }
 
     /// Waves in the whole picture.
@@ -226,7 +222,6 @@ impl Plan {
         leave(features.single_sided, &["back-face culling"], "all materials are double-sided");
         leave(features.instances, &["instances"], "no mesh is shared, or that would save little");
         leave(features.thin_triangles, &["watch over thin triangles"], "no triangle is 32 times as long as high");
-        leave(features.deep_tree, &["watch over the stack"], "the tree is no deeper than the stack");
         leave(features.multisampling, &["sample positions", "film_rest"], "one sample a pixel goes through its centre");
         let even = if features.multisampling {
             "the pixel's area counts evenly"
@@ -240,26 +235,5 @@ impl Plan {
     /// Bytes of the queues.
     pub fn queue_bytes(&self) -> u64 {
         self.buffers.iter().filter(|buffer| buffer.is_queue).map(|buffer| buffer.bytes).sum()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::render::Options;
-    use crate::scene::built_in;
-
-    #[test]
-    fn trees_of_more_nodes_than_groups_can_name_are_refused() {
-        let scene = built_in("table").unwrap();
-        let prepared = Prepared::new(&scene, &Options::default()).unwrap();
-        let plan = |nodes: u32| {
-            let tree = TreeSize { nodes: nodes as usize, ..TreeSize::default() };
-            Plan::new(&prepared, &scene, prepared.features, tree, WORKGROUP)
-        };
-        assert!(plan(MOST_NODES).is_ok());
-        let refused = plan(MOST_NODES + 1).unwrap_err();
-        assert_eq!(refused.exit_code(), 2);
-        assert!(refused.to_string().contains("8388608 nodes"), "{refused}");
     }
 }

@@ -95,7 +95,7 @@ impl Renderer {
             Features { shadows: true, reflections: true, moller_trumbore, thin_triangles, ..Features::default() };
         let features = tree.features(features);
         let textures = Textures::of(scene, features.textures, self.device.fetch_limit())?;
-        let plan = Plan::with_textures(prepared, scene, features, tree.size(), width * height, &textures)?;
+        let plan = Plan::with_textures(prepared, scene, features, tree.size(), width * height, &textures);
         if plan.waves(1) != 1 {
             return Err(Error::Usage(format!("{width}x{height} rays do not fit into one wave")));
         }

@@ -5,7 +5,7 @@
 //! device is a [`Rebase`] of one of the scene's.
 
 use crate::bvh::{quantise, reference, Aabb, Bvh, Child, DeviceNode, Grid, Quality};
-use crate::layout::{Features, Instance, LEAF_IS_INSTANCE, NODE_TEXELS, STACK_REGISTERS};
+use crate::layout::{Features, Instance, LEAF_IS_INSTANCE, NODE_TEXELS};
 use crate::report;
 use crate::scene::{bounds_of, box_corners, Placement, Projection, Soup, View};
 use glam::{DMat3, DMat4, DVec3, Vec3};
@@ -195,10 +195,7 @@ impl Tree {
 
     /// The features with what the trees themselves need.
     pub fn features(&self, features: Features) -> Features {
-        let instances = features.instances || self.upper.is_some();
-        // One is the mark where an instance was entered.
-        let entries = self.deepest(|bvh| bvh.wide.stack) + u32::from(instances);
-        Features { deep_tree: features.deep_tree || entries > STACK_REGISTERS, instances, ..features }
+        Features { instances: features.instances || self.upper.is_some(), ..features }
     }
 
     /// Sizes on the device.
@@ -211,20 +208,15 @@ impl Tree {
         }
     }
 
-    /// What is most on any path through both levels of trees.
-    fn deepest(&self, of: impl Fn(&Bvh) -> u32) -> u32 {
-        let lower = self.parts.iter().map(|part| of(&part.bvh)).max().unwrap_or(0);
-        lower + self.upper.as_ref().map_or(0, of)
-    }
-
     /// Counts for a report: the deepest path through both levels; the cost of the tree that rays enter first, with an instance
     /// counted as one triangle.
     pub fn report(&self) -> report::Tree {
         let root = self.upper.as_ref().or(self.parts.first().map(|part| &part.bvh)).map(Bvh::stats);
         let nodes = self.size().nodes;
+        let lower = self.parts.iter().map(|part| part.bvh.wide.depth);
         report::Tree {
             nodes,
-            depth: self.deepest(|bvh| bvh.wide.depth),
+            depth: lower.max().unwrap_or(0) + self.upper.as_ref().map_or(0, |upper| upper.wide.depth),
             sah_cost: root.map_or(0.0, |stats| stats.sah_cost),
             bytes: 16 * u64::from(NODE_TEXELS) * nodes as u64,
             update: self.update,

@@ -34,7 +34,7 @@ impl Scene<'_> {
     pub fn buffer(&self, renderer: &Renderer, slot: u32, features: Features) -> Option<Result<Buffer>> {
         let make = |name, bytes: &[u8], usage| Buffer::with_data(&renderer.device, name, bytes, usage);
         Some(match slot {
-            binding::NODES => make("nodes", bytemuck::cast_slice(&self.tree.nodes), Usage::FetchedWords),
+            binding::NODES => make("nodes", bytemuck::cast_slice(&self.tree.nodes), Usage::Fetch),
             binding::TRIANGLES => {
                 let bytes = self.tree.order.len() * size_of::<TriangleTexels>();
                 Buffer::filled(&renderer.device, "triangles", bytes as u64, Usage::Fetch, |target| {

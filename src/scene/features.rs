@@ -35,7 +35,6 @@ pub fn of(scene: &Scene, soup: &Soup, view: &View) -> Features {
         thin_triangles: soup.flags.iter().any(|flags| flags.thin),
         layers: materials.iter().any(|material| material.lets_light_through()),
         // These are the renderer's to know.
-        deep_tree: false,
         instances: false,
         retrace: false,
         fixed_epsilon: false,

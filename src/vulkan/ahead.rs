@@ -133,21 +133,19 @@ fn cores() -> usize {
 struct Nothing {
     // Before the buffers that it names.
     bindings: Bindings,
-    _buffers: [Buffer; 4],
+    _buffers: [Buffer; 3],
 }
 
 impl Nothing {
     fn new(layout: &Arc<Layout>) -> Result<Self> {
         let buffer = |usage| Buffer::new(&layout.device, "nothing", 0, usage, Memory::Device);
-        let [fetch, words] = [buffer(Usage::Fetch)?, buffer(Usage::FetchedWords)?];
-        let [storage, uniform] = [buffer(Usage::Storage)?, buffer(Usage::Uniform)?];
+        let [fetch, storage, uniform] = [buffer(Usage::Fetch)?, buffer(Usage::Storage)?, buffer(Usage::Uniform)?];
         let bindings = Bindings::new(layout, |slot| match layout.kind(slot) {
             SlotKind::Fetch => &fetch,
-            SlotKind::Words => &words,
             SlotKind::Storage => &storage,
             SlotKind::Uniform => &uniform,
         })?;
-        Ok(Self { bindings, _buffers: [fetch, words, storage, uniform] })
+        Ok(Self { bindings, _buffers: [fetch, storage, uniform] })
     }
 
     /// Dispatches no workgroups; how long that takes.

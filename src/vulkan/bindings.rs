@@ -10,8 +10,6 @@ use std::sync::Arc;
 pub enum SlotKind {
     /// Texels, through the device's [`Fetch`].
     Fetch,
-    /// 32-bit words, likewise.
-    Words,
     /// Storage buffer.
     Storage,
     /// Uniform buffer.
@@ -30,10 +28,8 @@ pub struct BindingSlot {
 impl BindingSlot {
     fn descriptor_type(self, fetch: Fetch) -> vk::DescriptorType {
         match (self.kind, fetch) {
-            (SlotKind::Fetch | SlotKind::Words, Fetch::Texel) => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
-            (SlotKind::Fetch | SlotKind::Words, Fetch::Storage) | (SlotKind::Storage, _) => {
-                vk::DescriptorType::STORAGE_BUFFER
-            }
+            (SlotKind::Fetch, Fetch::Texel) => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
+            (SlotKind::Fetch, Fetch::Storage) | (SlotKind::Storage, _) => vk::DescriptorType::STORAGE_BUFFER,
             (SlotKind::Uniform, _) => vk::DescriptorType::UNIFORM_BUFFER,
         }
     }
@@ -156,7 +152,7 @@ impl Bindings {
             let buffer = buffer_of(slot.slot);
             let kind = slot.descriptor_type(device.fetch);
             let ranges = [vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(vk::WHOLE_SIZE)];
-            let views = [if slot.kind == SlotKind::Words { buffer.words } else { buffer.texels }];
+            let views = [buffer.texel_view];
             let write = vk::WriteDescriptorSet::default()
                 .dst_set(self.set)
                 .dst_binding(slot.slot)

@@ -1,4 +1,4 @@
-//! Buffers: memory, optional texel views, upload and read-back.
+//! Buffers: memory, optional texel view, upload and read-back.
 
 use super::device::lock;
 use super::huge_pages::prefer_huge_pages;
@@ -11,16 +11,12 @@ use std::sync::Arc;
 
 /// Bytes of a `uvec4` texel.
 const TEXEL: u64 = 16;
-/// Bytes of a `uint` texel.
-const WORD: u64 = 4;
 
 /// What a buffer is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Usage {
     /// Read-only texels, seen through the device's [`Fetch`].
     Fetch,
-    /// The same, also seen word by word.
-    FetchedWords,
     /// A storage buffer.
     Storage,
     /// A storage buffer that later passes read as [`Usage::Fetch`].
@@ -47,9 +43,7 @@ pub struct Buffer {
     device: Arc<Device>,
     pub(super) raw: vk::Buffer,
     /// Its `uvec4` texels, where the device fetches them.
-    pub(super) texels: vk::BufferView,
-    /// Its words, likewise.
-    pub(super) words: vk::BufferView,
+    pub(super) texel_view: vk::BufferView,
     allocation: Option<Allocation>,
     /// Size in bytes, as asked for and padded.
     pub bytes: u64,
@@ -63,13 +57,12 @@ impl Buffer {
     /// # Errors
     /// `Device` when it is larger than the device can bind; `Vulkan` or `Device` when there is no memory for it.
     pub fn new(device: &Arc<Device>, name: &'static str, bytes: u64, usage: Usage, memory: Memory) -> Result<Self> {
-        let fetched = matches!(usage, Usage::Fetch | Usage::FetchedWords | Usage::FetchedStorage);
+        let fetched = matches!(usage, Usage::Fetch | Usage::FetchedStorage);
         let texels = fetched && device.fetch == Fetch::Texel;
         let bytes = padded(bytes, fetched);
         let most_texel_bytes = u64::from(device.info.max_texels) * TEXEL;
         let limit = match usage {
             Usage::Fetch if texels => most_texel_bytes,
-            Usage::FetchedWords if texels => u64::from(device.info.max_texels) * WORD,
             Usage::FetchedStorage if texels => most_texel_bytes.min(device.info.max_storage_bytes),
             Usage::Uniform => 16384,
             _ => device.info.max_storage_bytes,
@@ -81,13 +74,11 @@ impl Buffer {
             )));
         }
         let kind = match usage {
-            Usage::Fetch | Usage::FetchedWords if texels => vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER,
+            Usage::Fetch if texels => vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER,
             Usage::FetchedStorage if texels => {
                 vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER
             }
-            Usage::Fetch | Usage::FetchedWords | Usage::Storage | Usage::FetchedStorage => {
-                vk::BufferUsageFlags::STORAGE_BUFFER
-            }
+            Usage::Fetch | Usage::Storage | Usage::FetchedStorage => vk::BufferUsageFlags::STORAGE_BUFFER,
             Usage::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
             Usage::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
         };
@@ -95,15 +86,12 @@ impl Buffer {
         let info = vk::BufferCreateInfo::default().size(bytes).usage(kind | transfer);
         // SAFETY: a valid description; the buffer is owned by the struct that is made next and freed in its Drop.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.map_err(failed(format!("create buffer {name}")))?;
-        let none = vk::BufferView::null();
-        let mut buffer = Self { device: device.clone(), raw, texels: none, words: none, allocation: None, bytes, name };
+        let texel_view = vk::BufferView::null();
+        let mut buffer = Self { device: device.clone(), raw, texel_view, allocation: None, bytes, name };
         device.set_name(raw, name);
         buffer.allocate(memory)?;
         if texels {
-            buffer.texels = buffer.view_as(vk::Format::R32G32B32A32_UINT)?;
-        }
-        if texels && usage == Usage::FetchedWords {
-            buffer.words = buffer.view_as(vk::Format::R32_UINT)?;
+            buffer.make_texel_view()?;
         }
         Ok(buffer)
     }
@@ -182,13 +170,16 @@ impl Buffer {
         bound.map_err(failed(format!("bind memory of {}", self.name)))
     }
 
-    fn view_as(&self, format: vk::Format) -> Result<vk::BufferView> {
-        let info = vk::BufferViewCreateInfo::default().buffer(self.raw).format(format).range(vk::WHOLE_SIZE);
+    fn make_texel_view(&mut self) -> Result<()> {
+        let info = vk::BufferViewCreateInfo::default()
+            .buffer(self.raw)
+            .format(vk::Format::R32G32B32A32_UINT)
+            .range(vk::WHOLE_SIZE);
         // SAFETY: the buffer has texel usage, its size is a multiple of a texel and within the device's limit.
-        let view = unsafe { self.device.raw.create_buffer_view(&info, None) }
+        self.texel_view = unsafe { self.device.raw.create_buffer_view(&info, None) }
             .map_err(failed(format!("create texel view of {}", self.name)))?;
-        self.device.set_name(view, self.name);
-        Ok(view)
+        self.device.set_name(self.texel_view, self.name);
+        Ok(())
     }
 
     /// The host's view of the first bytes, to be written.
@@ -211,10 +202,8 @@ impl Buffer {
 impl Drop for Buffer {
     fn drop(&mut self) {
         // SAFETY: commands that use the buffer were waited for; null is allowed.
-        unsafe { self.device.raw.destroy_buffer_view(self.texels, None) };
-        // SAFETY: as above.
-        unsafe { self.device.raw.destroy_buffer_view(self.words, None) };
-        // SAFETY: as above, and the views are gone.
+        unsafe { self.device.raw.destroy_buffer_view(self.texel_view, None) };
+        // SAFETY: as above, and the view is gone.
         unsafe { self.device.raw.destroy_buffer(self.raw, None) };
         if let Some(allocation) = self.allocation.take() {
             lock(&self.device.memory).now -= allocation.size();

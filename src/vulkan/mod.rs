@@ -7,7 +7,7 @@
 //!                    └─ Commands (record: label, bind, dispatch, barrier, timestamp → submit and wait)
 //! ```
 //! All `unsafe` of the project lives in this room: one block, one call, one reason. Every object holds an `Arc` of the device
-//! and is freed in `Drop`; the device holds the instance. [`HugePages`] is for programs: memory that large scenes go through. Vulkan 1.2, no window system extension.
+//! and is freed in `Drop`; the device holds the instance. [`HugePages`] and [`prefer_wide_vectors`] are for programs: memory that large scenes go through, rays side by side. Vulkan 1.2, no window system extension.
 
 #![allow(unsafe_code)]
 
@@ -20,6 +20,7 @@ mod device;
 mod huge_pages;
 mod instance;
 mod kernel;
+mod vectors;
 
 pub use ahead::{Ahead, Compiled};
 pub use bindings::{BindingSlot, Bindings, Layout, SlotKind};
@@ -30,6 +31,7 @@ pub use device::{Device, DeviceChoice, DeviceInfo, DeviceKind, Fetch, Habits};
 pub use huge_pages::HugePages;
 pub use instance::Instance;
 pub use kernel::{Kernel, Source};
+pub use vectors::prefer_wide_vectors;
 
 use crate::error::Error;
 
