@@ -39,6 +39,7 @@ fn pictures_do_not_depend_on_how_many_rays_are_traced_side_by_side() {
         let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
         command.current_dir(folder.path()).args(["render", "table", "--size", "200x150", "--json"]);
         command.env_remove("LP_NATIVE_VECTOR_WIDTH").envs(bits.map(|bits| ("LP_NATIVE_VECTOR_WIDTH", bits)));
+        command.env("MESA_SHADER_CACHE_DIR", folder.path().join("code"));
         let output = command.output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{bits:?}: {}", super::cli::text(&output.stderr));
         serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
@@ -50,10 +51,14 @@ fn pictures_do_not_depend_on_how_many_rays_are_traced_side_by_side() {
         let name = report["device"]["name"].as_str().unwrap();
         assert!(name.contains(&format!("{bits} bits")), "what the user has set stands: {name}");
         assert_eq!(report["image"]["sha256"], usual["image"]["sha256"], "{name}");
+        // Mesa 25 would take code for other vectors for its own.
+        let own_code = folder.path().join(format!("code/vectors of {bits} bits/mesa_shader_cache"));
+        assert!(own_code.read_dir().is_ok_and(|mut code| code.next().is_some()), "{}", own_code.display());
     }
     // The kernel's word for what the processor has.
     let Ok(processor) = std::fs::read_to_string("/proc/cpuinfo") else { return };
     let flags: Vec<&str> = processor.lines().find(|line| line.starts_with("flags")).unwrap_or("").split(' ').collect();
-    let is_wide = ["avx512f", "avx512bw", "avx512dq", "avx512vl", "sse4a"].iter().all(|flag| flags.contains(flag));
+    let needed = ["avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512_vp2intersect", "sse4a"];
+    let is_wide = needed.iter().all(|flag| flags.contains(flag));
     assert_eq!(usual["device"]["name"].as_str().unwrap().contains("512 bits"), is_wide, "{}", usual["device"]["name"]);
 }
