@@ -37,6 +37,17 @@ fn a_benchmark_and_its_files() {
     assert_eq!(size("teapot.bin"), 4 + 36 * told["triangles"].as_u64().unwrap());
     assert_eq!((size("teapot.shadow.rays"), size("teapot.shadow.ref")), (32 * 128 * 96, 4 * 128 * 96));
 
+    // Counted on the host: in step rays take no fewer rounds than one of them takes steps, and no more than all together.
+    assert!(told["sets"][0].get("work").is_none());
+    for set in json(&bench(&["--work"]))["sets"].as_array().unwrap() {
+        let figure = |key: &str| set["work"][key].as_f64().unwrap();
+        assert_eq!(figure("lanes"), told["device"]["subgroup_size"].as_f64().unwrap());
+        for (steps, rounds) in [("nodes", "node_rounds"), ("triangles", "triangle_rounds")] {
+            let [steps, rounds] = [steps, rounds].map(figure);
+            assert!(0.5 < steps && steps < rounds && rounds < steps * figure("lanes"), "{set}");
+        }
+    }
+
     // The same rays answered again; then one answer is spoilt.
     let compared = json(&bench(&["--compare", "rays", "--sets", "diffuse,shadow"]));
     for set in compared["sets"].as_array().unwrap() {

@@ -13,11 +13,13 @@ mod refit;
 mod reinsert;
 mod spatial_split;
 mod stats;
+mod walk;
 mod wide;
 
 pub use aabb::Aabb;
 pub use quantise::{quantise, reference, DeviceNode, Grid, Quantised};
 pub use stats::Stats;
+pub use walk::Steps;
 pub use wide::{Side, Wide, WideChild, WideNode, WIDTH};
 
 use crate::layout::{MAX_LEAF_TRIANGLES, MAX_TREE_DEPTH};

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum, ValueHint};
 use glam::{DVec3, Vec3};
 use glimt::render::ray_sets::{BenchRay, BenchView, PrimaryHit, SetKind};
 use glimt::render::{describe_device, Met, Prepared, Ray, Renderer, Trace, Tracer};
-use glimt::report::{Bench, BenchTree, Mismatches, Set, Spread};
+use glimt::report::{Bench, BenchTree, Mismatches, Set, Spread, Work};
 use glimt::scene::{Camera, Instancing, LightKind, Projection};
 use glimt::vulkan::DeviceChoice;
 use glimt::{reference, Error, Options, Result, Scene};
@@ -44,6 +44,9 @@ pub struct BenchArgs {
     bvh: BvhChoice,
     #[command(flatten)]
     machine: MachineArgs,
+    /// Also count on the host what the rays ask of the tree: nodes and triangles, alone and as many rays in step as the device's subgroups have
+    #[arg(long)]
+    work: bool,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -103,7 +106,9 @@ impl BenchArgs {
         let build_ms = Spread::of(std::iter::once(first_ms).chain((1..BUILDS).map(|_| build().1))).median;
         let mut tracer = renderer.tracer(&scene, &prepared, &tree)?;
         let mut files = Files::of(&self, &scene.name);
-        let sets = self.trace(&mut tracer, &prepared, &view, &options, &mut files)?;
+        let lanes = renderer.device().info.subgroup_size as usize;
+        let work = |kind, rays: &[Ray]| tree.work(&prepared, kind, rays, lanes);
+        let sets = self.trace(&mut tracer, &prepared, &view, &options, &mut files, work)?;
         if self.machine.validate && !renderer.device().instance.messages().is_empty() {
             return Err(Error::Validation(renderer.device().instance.messages()));
         }
@@ -161,6 +166,7 @@ impl BenchArgs {
         view: &BenchView,
         options: &Options,
         files: &mut Files,
+        work: impl Fn(SetKind, &[Ray]) -> Work,
     ) -> Result<Vec<Set>> {
         let order = view.order();
         let by_pixel = view.primary();
@@ -189,14 +195,16 @@ impl BenchArgs {
             }
             let pixels: Vec<u32> = order.iter().copied().filter(|pixel| rays[*pixel as usize].t_max >= 0.0).collect();
             let active: Vec<BenchRay> = pixels.iter().map(|pixel| rays[*pixel as usize]).collect();
+            let walked: Vec<Ray> = active.iter().map(Ray::from).collect();
             let traced = if kind == SetKind::Primary {
                 trace.clone()
             } else {
-                tracer.trace(kind, &active.iter().map(Ray::from).collect::<Vec<_>>(), runs(kind), options)?
+                tracer.trace(kind, &walked, runs(kind), options)?
             };
             let answers: Vec<f32> = traced.met.iter().map(answer).collect();
             let mismatches = files.compare(kind, prepared, &pixels, &active, &answers)?;
-            sets.push(described(kind, &traced, mismatches));
+            let work = self.work.then(|| work(kind, &walked));
+            sets.push(Set { work, ..described(kind, &traced, mismatches) });
             files.keep(kind, rays, &pixels, &answers);
         }
         Ok(sets)
@@ -222,6 +230,7 @@ fn described(kind: SetKind, trace: &Trace, mismatches: Option<Mismatches>) -> Se
         device_ms: Spread::of(trace.device_ms.iter().copied()),
         wall_ms: Spread::of(trace.wall_ms.iter().copied()),
         mismatches,
+        work: None,
     }
 }
 

@@ -14,6 +14,7 @@ mod trace;
 mod tracers;
 mod tree;
 mod upload;
+mod work;
 
 pub use options::{Options, Progress, Sabotage};
 pub use plan::{LeftOut, Plan, PlannedBuffer, PlannedPass};

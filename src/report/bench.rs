@@ -36,6 +36,24 @@ pub struct Set {
     /// Against the answers of another program, where asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mismatches: Option<Mismatches>,
+    /// What the rays ask of the tree, where asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub work: Option<Work>,
+}
+
+/// What rays ask of the tree, means.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Work {
+    /// Wide nodes that a ray visits.
+    pub nodes: f64,
+    /// Triangles that it is tested with.
+    pub triangles: f64,
+    /// Rays that walk in step: a subgroup of the device.
+    pub lanes: usize,
+    /// Rounds in which so many rays visit nodes.
+    pub node_rounds: f64,
+    /// Rounds in which they test triangles.
+    pub triangle_rounds: f64,
 }
 
 /// Rays whose answer differs from another program's: hit or not, or a distance that differs by more than 1e-3 of it.
@@ -123,6 +141,16 @@ impl Bench {
                 line += &format!("  mismatches {count} ({missed} missed, {extra} extra), wrong {wrong}");
             }
             lines.push(line);
+        }
+        for (set, work) in self.sets.iter().filter_map(|set| Some((set.name, set.work?))) {
+            let Work { nodes, triangles, lanes, node_rounds, triangle_rounds } = work;
+            let busy = |steps: f64, rounds: f64| 100.0 * steps / rounds.max(1.0);
+            lines.push(format!(
+                "{set:<10}visits {nodes:.1} nodes and {triangles:.1} triangles a ray; {lanes} rays in step: {node_rounds:.1} and {triangle_rounds:.1} \
+                 rounds, {:.0} and {:.0} % of them at work",
+                busy(nodes, node_rounds),
+                busy(triangles, triangle_rounds)
+            ));
         }
         lines.join("\n")
     }

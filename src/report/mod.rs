@@ -7,7 +7,7 @@ mod slope;
 mod stress;
 pub mod study;
 
-pub use bench::{Bench, BenchTree, Mismatches, Set, Spread};
+pub use bench::{Bench, BenchTree, Mismatches, Set, Spread, Work};
 pub use slope::{log_log_slope, Slope};
 pub use stress::{stress_page, StressRow};
 
