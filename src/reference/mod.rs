@@ -13,7 +13,7 @@ pub use verdict::allows;
 
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::scene::{precedence, Background, Light, LightKind, Projection, Scene, Soup, View};
+use crate::scene::{precedence, Background, Crossing, Light, LightKind, Projection, Scene, Soup, View};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -140,19 +140,9 @@ impl Tracer<'_> {
 
     /// λ2, λ3, t and whether the front is hit; for a ray that meets the triangle in front of its origin.
     fn intersect(&self, ray: &Ray, primitive: usize) -> Option<(f64, f64, f64, bool)> {
-        let [a, b, c] = self.soup.positions[primitive];
-        let (edge_b, edge_c) = (b - a, c - a);
-        let across = ray.direction.cross(edge_c);
-        let determinant = edge_b.dot(across);
-        if determinant == 0.0 {
-            return None;
-        }
-        let from_a = ray.origin - a;
-        let u = from_a.dot(across) / determinant;
-        let around = from_a.cross(edge_b);
-        let v = ray.direction.dot(around) / determinant;
-        let t = edge_c.dot(around) / determinant;
-        (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some((u, v, t, determinant > 0.0))
+        let crossing = Crossing::of(&self.soup.positions[primitive], ray.origin, ray.direction);
+        let Crossing { u, v, t, determinant } = crossing;
+        crossing.is_hit().then_some((u, v, t, determinant > 0.0))
     }
 
     /// The nearest hit of all triangles; of several at the same distance a front before a back, then the one that takes precedence, then the first in the soup.

@@ -1,6 +1,6 @@
 //! Is an answer of another program allowed by f64 arithmetic?
 
-use crate::scene::Soup;
+use crate::scene::{Crossing, Soup};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -19,13 +19,9 @@ pub fn allows(soup: &Soup, origin: DVec3, direction: DVec3, t_max: f64, met: Opt
     let candidates: Vec<(f64, f64, f64)> = soup
         .positions
         .par_iter()
-        .filter_map(|[a, b, c]| {
+        .filter_map(|corners @ [a, b, c]| {
             let (edge_b, edge_c) = (*b - *a, *c - *a);
-            let across = direction.cross(edge_c);
-            let determinant = edge_b.dot(across);
-            let from_a = origin - *a;
-            let (u, around) = (from_a.dot(across) / determinant, from_a.cross(edge_b));
-            let (v, t) = (direction.dot(around) / determinant, edge_c.dot(around) / determinant);
+            let Crossing { u, v, t, determinant } = Crossing::of(corners, origin, direction);
             // As seen along the ray, each barycentric coordinate times the height above its edge.
             let height = |edge: DVec3| determinant.abs() / edge.cross(direction).length() / direction.length();
             let least = (u * height(edge_c)).min(v * height(edge_b)).min((1.0 - u - v) * height(edge_c - edge_b));

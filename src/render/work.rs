@@ -4,23 +4,31 @@ use super::ray_sets::SetKind;
 use super::{Prepared, Ray, Tree};
 use crate::bvh::{Quantised, Steps};
 use crate::report::Work;
-use glam::Vec3;
+use crate::scene::Crossing;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 impl Tree {
-    /// The steps of a set's rays, alone and with `lanes` of them in step, as they lie beside each other in their set. For soups that are flat.
+    /// The steps of a set's rays, alone and with `lanes` of them in step, as they lie beside each other in their set. For soups that are flat, their triangles opaque
+    /// and seen from either side; edges within rounding go either way, as rays are counted here, not answered.
     pub fn work(&self, prepared: &Prepared, kind: SetKind, rays: &[Ray], lanes: usize) -> Work {
         let (soup, rebase) = (&prepared.soup, self.rebase);
         let device = self.for_device(soup, prepared.view.camera.eye);
         let tree = Quantised { nodes: device.nodes, grid: device.grid };
-        let triangles: Vec<[Vec3; 3]> =
-            device.order.par_iter().map(|primitive| rebase.triangle(&soup.positions[*primitive as usize])).collect();
+        let triangles: Vec<[DVec3; 3]> = device
+            .order
+            .par_iter()
+            .map(|primitive| rebase.triangle(&soup.positions[*primitive as usize]).map(Vec3::as_dvec3))
+            .collect();
         let walk = |ray: &Ray| {
             let (origin, direction) = (rebase.point(ray.origin), rebase.direction(ray.direction));
             let t_max = (ray.t_max * rebase.scale) as f32;
             tree.walk(origin, direction, t_max, |places, t_max| {
-                let met = triangles[places].iter().filter_map(|corners| distance(origin, direction, corners));
-                let nearest = met.fold(f32::INFINITY, f32::min);
+                let met = triangles[places]
+                    .iter()
+                    .map(|corners| Crossing::of(corners, origin.as_dvec3(), direction.as_dvec3()));
+                let nearest =
+                    met.filter(Crossing::is_hit).fold(f32::INFINITY, |nearest, met| nearest.min(met.t as f32));
                 let is_met = nearest < *t_max;
                 *t_max = t_max.min(nearest);
                 is_met && kind == SetKind::Shadow
@@ -42,17 +50,4 @@ impl Tree {
             triangle_rounds: mean(in_step.primitives, groups),
         }
     }
-}
-
-/// Where a ray meets a triangle (Möller and Trumbore, JGT 2(1) 1997), in lengths of its direction. Edges within rounding go either way: rays are counted
-/// here, not answered.
-fn distance(origin: Vec3, direction: Vec3, [a, b, c]: &[Vec3; 3]) -> Option<f32> {
-    let [edge_b, edge_c, from_a] = [*b - *a, *c - *a, origin - *a].map(Vec3::as_dvec3);
-    let direction = direction.as_dvec3();
-    let across = direction.cross(edge_c);
-    let determinant = edge_b.dot(across);
-    let around = from_a.cross(edge_b);
-    let (v, w) = (from_a.dot(across) / determinant, direction.dot(around) / determinant);
-    let t = edge_c.dot(around) / determinant;
-    (v >= 0.0 && w >= 0.0 && v + w <= 1.0 && t > 0.0).then_some(t as f32)
 }

@@ -29,6 +29,7 @@ mod soup;
 mod tangents;
 mod teapot;
 mod texture;
+mod triangle;
 mod view;
 
 pub use self::image::{Image, Pixels};
@@ -46,6 +47,7 @@ pub use sampling::{Filter, Sampler};
 pub use sharing::Instancing;
 pub use soup::{Placement, Soup, TriangleFlags};
 pub use texture::{Map, Maps, Minify, Texture, UsedMap, Wrap};
+pub use triangle::Crossing;
 pub use view::{View, MAX_SAMPLES};
 
 use glam::{DMat4, Vec2, Vec3, Vec4};
