@@ -173,7 +173,7 @@ mod tests {
         assert!((100..1024).contains(&hits), "{hits}");
     }
 
-    /// In a column of boxes the first that a ray comes to is the first that it is tested with.
+    /// In a column of boxes the first that a ray comes to is the first that it is tested with, and what lies behind a hit is not visited.
     #[test]
     fn walks_go_to_the_nearest_first() {
         let boxes: Vec<Aabb> = (0..64)
@@ -191,6 +191,14 @@ mod tests {
                 true
             });
             assert!(tested.contains(&first) && tested.len() <= 4, "{tested:?}");
+            // Met there, the ray leaves alone what lies behind, but for what waited on the stack beside its way.
+            let mut tested = 0;
+            tree.walk(Vec3::new(0.4, 0.6, z), Vec3::new(0.001, 0.002, up), 200.0, |places, t_max| {
+                tested += places.len();
+                *t_max = 40.0;
+                false
+            });
+            assert!(tested < boxes.len(), "{tested}");
         }
     }
 
