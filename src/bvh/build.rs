@@ -6,6 +6,7 @@
 
 use super::references::{Box4, Reference, Summary};
 use super::reinsert::reinsert;
+use super::share::share_leaves;
 use super::{object_split, spatial_split, Bvh, Child, Node};
 use crate::layout::MAX_TREE_DEPTH;
 use glam::Vec3;
@@ -70,6 +71,9 @@ pub(super) fn build(space: &mut [Reference], count: usize, recipe: Recipe) -> Bv
         closed(&mut root);
     }
     nodes.iter_mut().flat_map(|node| &mut node.children).for_each(closed);
+    if order.len() > count {
+        order = share_leaves(&mut nodes, order, count);
+    }
     Bvh::new(root, nodes, order, bounds.aabb())
 }
 

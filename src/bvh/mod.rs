@@ -11,6 +11,7 @@ mod quantise;
 mod references;
 mod refit;
 mod reinsert;
+mod share;
 mod spatial_split;
 mod stats;
 mod walk;
@@ -64,7 +65,7 @@ pub struct Node {
 pub struct Bvh {
     /// Inner nodes.
     pub nodes: Vec<Node>,
-    /// Primitives in leaf order; one that spatial splits cut appears several times.
+    /// Primitives in leaf order. One that spatial splits cut is in several leaves, most of which share its place: see `share.rs`.
     pub order: Vec<u32>,
     /// Box around everything.
     pub bounds: Aabb,
@@ -168,13 +169,14 @@ impl Bvh {
     }
 
     /// Checks every invariant: each primitive wholly in one leaf, boxes that hold what is below them, leaf sizes, depth, order
-    /// of nodes. Where `triangles` are given, a primitive may instead lie in parts in several leaves, and points all over it
+    /// of nodes, no place in the order of primitives that is no leaf's. Where `triangles` are given, a primitive may instead lie in parts in several leaves, and points all over it
     /// must be inside their boxes.
     ///
     /// # Errors
     /// The first broken invariant, in words.
     pub fn validate(&self, boxes: &[Aabb], triangles: Option<&[[Vec3; 3]]>) -> Result<(), String> {
         let mut leaves_of = vec![Vec::new(); boxes.len()];
+        let mut is_used = vec![false; self.order.len()];
         let mut visited = 0;
         let mut stack = vec![(0_u32, self.bounds, 1_u32)];
         while let Some((index, bounds, depth)) = stack.pop() {
@@ -190,8 +192,9 @@ impl Bvh {
                         return Err(format!("a leaf of {count} primitives below node {index}"));
                     }
                     Child::Leaf { first, count } => {
-                        for place in first..first + count {
-                            leaves_of[self.order[place as usize] as usize].push(child_bounds);
+                        for place in first as usize..(first + count) as usize {
+                            leaves_of[self.order[place] as usize].push(child_bounds);
+                            is_used[place] = true;
                         }
                     }
                     Child::Node(below) if below <= index => return Err(format!("node {below} lies below {index}")),
@@ -204,6 +207,9 @@ impl Bvh {
         }
         if visited != self.nodes.len() {
             return Err(format!("{visited} of {} nodes can be reached", self.nodes.len()));
+        }
+        if let Some(place) = is_used.iter().position(|is_used| !is_used) {
+            return Err(format!("place {place} of the order is in no leaf"));
         }
         for (primitive, leaves) in leaves_of.iter().enumerate() {
             match (leaves.as_slice(), triangles) {

@@ -2,7 +2,6 @@
 
 use super::build::VISIT_COST;
 use super::{Bvh, Child};
-use crate::layout::MAX_LEAF_TRIANGLES;
 
 /// What a tree looks like.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,20 +14,15 @@ pub struct Stats {
     pub depth: u32,
     /// Expected cost of a random ray that meets the root, in triangle tests: Σ area·(1.2 a node, 1 a triangle) / root area.
     pub sah_cost: f64,
-    /// How many leaves have 0, 1, 2, … primitives.
-    pub leaf_sizes: Vec<usize>,
+    /// Primitives in leaves; one that was cut counts in each.
+    pub references: usize,
 }
 
 impl Bvh {
     /// Counts the tree.
     pub fn stats(&self) -> Stats {
-        let mut stats = Stats {
-            nodes: self.nodes.len(),
-            leaves: 0,
-            depth: self.depth,
-            sah_cost: VISIT_COST.into(),
-            leaf_sizes: vec![0; MAX_LEAF_TRIANGLES as usize + 1],
-        };
+        let mut stats =
+            Stats { nodes: self.nodes.len(), leaves: 0, depth: self.depth, sah_cost: VISIT_COST.into(), references: 0 };
         let whole = f64::from(self.bounds.half_area()).max(f64::MIN_POSITIVE);
         for node in &self.nodes {
             for (child, bounds) in node.children.iter().zip(&node.bounds) {
@@ -36,7 +30,7 @@ impl Bvh {
                 match *child {
                     Child::Node(_) => stats.sah_cost += f64::from(VISIT_COST) * share,
                     Child::Leaf { count, .. } => {
-                        stats.leaf_sizes[count as usize] += 1;
+                        stats.references += count as usize;
                         stats.leaves += usize::from(count > 0);
                         stats.sah_cost += share * f64::from(count);
                     }

@@ -148,7 +148,7 @@ impl Rebase {
 pub struct TreeSize {
     /// Wide nodes of all trees.
     pub nodes: usize,
-    /// Triangles in leaves; one that was cut counts for each of its parts.
+    /// Triangles in the order of leaves; one that was cut counts wherever leaves do not share it.
     pub triangles: usize,
     /// Instances; 0 in a flat scene.
     pub instances: usize,
