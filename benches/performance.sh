@@ -3,7 +3,7 @@
 #
 #   benches/performance.sh [threads] [latency] [frame] [memory] [sizes] [first-ray]      default: all of them
 #
-#   threads    s2's ray sets on two threads against one, in seven turns
+#   threads    s2's ray sets on two threads against one, in seven turns, and two processes of one thread each: what the machine itself allows
 #   latency    s0 at 512², one sample, from the start of the process to the file: caches warm, empty, and none allowed
 #   frame      a whole picture of s1 and s4 at 1024 × 768, one light, depth 8, one thread: what each pass takes
 #   memory     the most that the process and the device hold for pictures of s1
@@ -28,6 +28,7 @@ fi
 export GLIMT
 exec python3 - "$@" <<'PYTHON'
 import json, math, os, re, struct, subprocess, sys, tempfile, time
+from concurrent.futures import ThreadPoolExecutor
 from statistics import median
 
 GLIMT, BENCH = os.environ["GLIMT"], os.path.abspath(os.environ["BENCH"])
@@ -44,10 +45,9 @@ def run(*arguments, cores=None, **environment):
     return json.loads(done.stdout), time.monotonic() - start
 
 
-def bench(scene, view, threads, *arguments):
+def bench(scene, view, threads, *arguments, cores=None):
     """Mrays/s of each set, and all of the answer."""
-    cores = f"0-{threads - 1}"
-    answer, _ = run("bench", scene, "--view", view, "--threads", threads, *arguments, cores=cores)
+    answer, _ = run("bench", scene, "--view", view, "--threads", threads, *arguments, cores=cores or f"0-{threads - 1}")
     return [one["mrays_per_s"]["median"] for one in answer["sets"]], answer
 
 
@@ -60,11 +60,17 @@ def scene(name):
 
 
 def threads(_):
-    turns = [(bench(*scene("s2"), 1, "--runs", 3)[0], bench(*scene("s2"), 2, "--runs", 3)[0]) for _ in range(TURNS)]
+    def side_by_side():
+        """Two processes of one thread each, a core each: their sum."""
+        with ThreadPoolExecutor() as pool:
+            both = list(pool.map(lambda core: bench(*scene("s2"), 1, "--runs", 3, cores=str(core))[0], [0, 1]))
+        return [sum(speeds) for speeds in zip(*both)]
+    turns = [(bench(*scene("s2"), 1, "--runs", 3)[0], bench(*scene("s2"), 2, "--runs", 3)[0], side_by_side()) for _ in range(TURNS)]
     for place, name in enumerate(SETS):
-        one, two = ([turn[side][place] for turn in turns] for side in (0, 1))
+        one, two, processes = ([turn[side][place] for turn in turns] for side in range(3))
+        times = [[b / a for a, b in zip(one, others)] for others in (two, processes)]
         print(f"  {name:8} {median(one):6.2f} -> {median(two):6.2f} Mrays/s, {median(two) / median(one):.2f} times; "
-              f"turn by turn {spread([b / a for a, b in zip(one, two)], 2)}")
+              f"turn by turn {spread(times[0], 2)}, two processes {spread(times[1], 2)}")
 
 
 def latency(folder):
