@@ -4,8 +4,22 @@
 //! piece is a leaf of the same two or three. Stored once for each leaf, triangles took 1.6 times the memory that they take now.
 
 use super::{Child, Node};
+use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::HashMap;
+
+/// Leaves look for each other among so many that lie one behind the other: those beyond are far away in the tree, and hardly the same.
+const NEIGHBOURS: usize = 65536;
+
+/// Where a leaf's primitives begin, and how many they are.
+type Leaf = (usize, usize);
+
+fn leaf(child: &Child) -> Option<Leaf> {
+    match child {
+        Child::Leaf { first, count: count @ 1.. } => Some((*first as usize, *count as usize)),
+        _ => None,
+    }
+}
 
 /// Renumbers the leaves below `nodes`, which lie in `order` one behind the other, so that a leaf whose primitives stand side by side in another has no places
 /// of its own; returns the order that remains. Leaves still have what they had, each in an order of its own; they come in the order of their nodes.
@@ -13,20 +27,52 @@ pub(super) fn share_leaves(nodes: &mut [Node], mut order: Vec<u32>, primitives: 
     let mut leaves_of = vec![0_u32; primitives];
     order.iter().for_each(|primitive| leaves_of[*primitive as usize] += 1);
     let is_cut = |primitive: &u32| leaves_of[*primitive as usize] > 1;
-    let mut leaves: Vec<(usize, usize)> = nodes.iter().flat_map(|node| node.children).filter_map(leaf).collect();
-    // What may stand elsewhere too lies side by side.
-    for (first, count) in &leaves {
-        order[*first..first + count].sort_unstable_by_key(|primitive| (is_cut(primitive), *primitive));
+    let leaves: Vec<Leaf> = nodes.iter().flat_map(|node| &node.children).filter_map(leaf).collect();
+    let mut pieces = Vec::with_capacity(leaves.len().div_ceil(NEIGHBOURS));
+    let mut rest = order.as_mut_slice();
+    for leaves in leaves.chunks(NEIGHBOURS) {
+        let (own, behind) = rest.split_at_mut(leaves.iter().map(|(_, count)| count).sum());
+        pieces.push((leaves, own));
+        rest = behind;
     }
-    // The largest first, of which others may be parts.
-    leaves.sort_by_key(|(_, count)| Reverse(*count));
-    let mut runs: HashMap<&[u32], usize> = HashMap::new();
-    // Where each leaf's primitives stand.
-    let mut place_of: Vec<usize> = (0..order.len()).collect();
+    // In the order before, where each leaf's primitives stand.
+    let stands: Vec<usize> = pieces.into_par_iter().flat_map_iter(|(leaves, own)| look(leaves, own, is_cut)).collect();
+    let mut shared = Vec::with_capacity(primitives);
+    let mut moved = vec![0_u32; order.len()];
+    for ((first, count), stands) in leaves.iter().zip(&stands) {
+        if first == stands {
+            for place in *first..first + count {
+                moved[place] = shared.len() as u32;
+                shared.push(order[place]);
+            }
+        }
+    }
+    let mut stands = stands.into_iter();
+    for child in nodes.iter_mut().flat_map(|node| &mut node.children) {
+        if let Child::Leaf { first, count: 1.. } = child {
+            *first = stands.next().map_or(0, |place| moved[place]);
+        }
+    }
+    shared
+}
+
+/// Puts what is cut of each leaf side by side, at its end, and returns for each of them where its primitives stand: in itself or in a larger leaf, as it lies in
+/// the whole order. `order` is that of the leaves' primitives.
+fn look(leaves: &[Leaf], order: &mut [u32], is_cut: impl Fn(&u32) -> bool) -> Vec<usize> {
+    let begin = leaves.first().map_or(0, |(first, _)| *first);
     for (first, count) in leaves {
-        let own = &order[first..first + count];
+        order[first - begin..][..*count].sort_unstable_by_key(|primitive| (is_cut(primitive), *primitive));
+    }
+    let mut stands: Vec<usize> = leaves.iter().map(|(first, _)| *first).collect();
+    // The largest first, of which others may be parts.
+    let mut largest_first: Vec<usize> = (0..leaves.len()).collect();
+    largest_first.sort_by_key(|leaf| Reverse(leaves[*leaf].1));
+    let mut runs: HashMap<&[u32], usize> = HashMap::new();
+    for leaf in largest_first {
+        let (first, count) = leaves[leaf];
+        let own = &order[first - begin..][..count];
         if let Some(place) = runs.get(own) {
-            place_of[first] = *place;
+            stands[leaf] = *place;
             continue;
         }
         let uncut = own.iter().take_while(|primitive| !is_cut(primitive)).count();
@@ -36,30 +82,7 @@ pub(super) fn share_leaves(nodes: &mut [Node], mut order: Vec<u32>, primitives: 
             }
         }
     }
-    let mut shared = Vec::with_capacity(primitives);
-    let mut moved = vec![0_u32; order.len()];
-    for (first, count) in nodes.iter().flat_map(|node| node.children).filter_map(leaf) {
-        if place_of[first] == first {
-            for place in first..first + count {
-                moved[place] = shared.len() as u32;
-                shared.push(order[place]);
-            }
-        }
-    }
-    for child in nodes.iter_mut().flat_map(|node| &mut node.children) {
-        if let Child::Leaf { first, count: 1.. } = child {
-            *first = moved[place_of[*first as usize]];
-        }
-    }
-    shared
-}
-
-/// Where a leaf's primitives begin, and how many they are.
-fn leaf(child: Child) -> Option<(usize, usize)> {
-    match child {
-        Child::Leaf { first, count: count @ 1.. } => Some((first as usize, count as usize)),
-        _ => None,
-    }
+    stands
 }
 
 #[cfg(test)]
@@ -77,8 +100,8 @@ mod tests {
         while let (Some(left), right) = (children.next(), children.next()) {
             nodes.push(Node { children: [left, right.unwrap_or(Node::NOTHING.children[1])], ..Node::NOTHING });
         }
-        let shared = share_leaves(&mut nodes, order, 10);
-        let held = nodes.iter().flat_map(|node| node.children).filter_map(leaf).map(|(first, count)| {
+        let shared = share_leaves(&mut nodes, order, 2 * NEIGHBOURS);
+        let held = nodes.iter().flat_map(|node| &node.children).filter_map(leaf).map(|(first, count)| {
             let mut held = shared[first..first + count].to_vec();
             held.sort_unstable();
             held
@@ -104,6 +127,15 @@ mod tests {
         assert_eq!(shared(&[&[4, 6], &[6, 4, 5]]).0.len(), 3);
         assert_eq!(shared(&[&[6, 4, 5], &[4, 6], &[6]]).0.len(), 3);
         assert_eq!(shared(&[&[6], &[6], &[6]]).0, [6]);
+    }
+
+    #[test]
+    fn many_leaves_share_with_their_neighbours() {
+        let numbers: Vec<u32> = (0..2 * NEIGHBOURS as u32 + 2).map(|place| place / 2).collect();
+        let leaves: Vec<&[u32]> = numbers.chunks(1).collect();
+        let (shared, held) = shared(&leaves);
+        assert_eq!(shared, (0..=NEIGHBOURS as u32).collect::<Vec<_>>());
+        assert!(held.iter().flatten().eq(&numbers));
     }
 
     #[test]
