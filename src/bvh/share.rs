@@ -1,7 +1,7 @@
 //! Leaves that hold the same primitives share their places in the order.
 //!
 //! A long triangle that spatial splits cut many times lies in many leaves, mostly with the same others: of the atrium's cables (see docs/performance.md) each
-//! piece is a leaf of the same two or three. Stored once for each leaf, triangles took 1.6 times the memory that they take now.
+//! piece is a leaf of the same two or three. Stored once for each leaf, triangles took 1.5 times the memory that they take now.
 
 use super::{Child, Node};
 use rayon::prelude::*;
