@@ -3,7 +3,7 @@
 #
 #   benches/against_embree.sh [--threads N] [--rounds N] [SCENE.glb VIEW.json]...   default: all benchmark scenes
 #
-# Needs g++ and libembree-dev (3 or 4), and the benchmark programs and scenes in $BENCH (default ../shared/bench).
+# Needs g++ and libembree-dev (3 or 4), and the benchmark programs and scenes in $BENCH (default ../shared/bench). The program is $GLIMT (default: it is built).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 BENCH=${BENCH:-../shared/bench}
@@ -22,10 +22,7 @@ fi
 if [ ${#scenes[@]} = 0 ]; then
     for name in s1 s2 s4; do scenes+=("$BENCH/scenes/$name.glb" "$BENCH/scenes/$name.json"); done
 fi
-config=()
-if [ -f /usr/lib/x86_64-linux-gnu/libshaderc_combined.a ]; then config=(--config scripts/shaderc-debian.toml); fi
-cargo build --release "${config[@]}"
-glimt=$PWD/target/release/glimt
+source benches/built.sh
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -39,13 +36,13 @@ cores="0-$((threads - 1))"
 for ((i = 0; i < ${#scenes[@]}; i += 2)); do
     scene=${scenes[i]} view=${scenes[i + 1]}
     name=$(basename "$scene" .glb)
-    "$glimt" bench "$scene" --view "$view" --runs 1 --export "$work" > /dev/null
+    "$GLIMT" bench "$scene" --view "$view" --runs 1 --export "$work" > /dev/null
     # Embree's own rays and answers from here on, which glimt compares itself with.
     (cd "$work" && ./gen_rays "$name.bin" "$name.json" > /dev/null)
     for ((round = 0; round < rounds; round++)); do
         (cd "$work" && EMBREE_CFG="threads=$threads" RUNS=3 BUILDS=2 taskset -c "$cores" ./embree_bench "$name.bin" "$name.json" 2> /dev/null)
         for quality in fast best; do
-            taskset -c "$cores" "$glimt" bench "$scene" --view "$view" --threads "$threads" --runs 3 --compare "$work" --bvh $quality |
+            taskset -c "$cores" "$GLIMT" bench "$scene" --view "$view" --threads "$threads" --runs 3 --compare "$work" --bvh $quality |
                 sed "s/^/glimt-$quality /"
         done
     done > "$work/$name.txt"

@@ -14,13 +14,7 @@ if [ ! -f "$CORPUS/MANIFEST.tsv" ]; then
     echo "batch: no corpus at $CORPUS: set CORPUS to its folder" >&2
     exit 2
 fi
-if [ -z "${GLIMT:-}" ]; then
-    config=()
-    if [ -f /usr/lib/x86_64-linux-gnu/libshaderc_combined.a ]; then config=(--config scripts/shaderc-debian.toml); fi
-    cargo build --release "${config[@]}"
-    GLIMT=$PWD/target/release/glimt
-fi
-export GLIMT
+source benches/built.sh
 exec python3 - "$@" <<'PYTHON'
 import csv, json, os, subprocess, sys, tempfile, time
 from statistics import mean

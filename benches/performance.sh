@@ -19,13 +19,7 @@ if [ ! -d "$BENCH/scenes" ]; then
     echo "performance: no benchmark scenes at $BENCH: set BENCH to their folder" >&2
     exit 2
 fi
-if [ -z "${GLIMT:-}" ]; then
-    config=()
-    if [ -f /usr/lib/x86_64-linux-gnu/libshaderc_combined.a ]; then config=(--config scripts/shaderc-debian.toml); fi
-    cargo build --release "${config[@]}"
-    GLIMT=$PWD/target/release/glimt
-fi
-export GLIMT
+source benches/built.sh
 exec python3 - "$@" <<'PYTHON'
 import json, math, os, re, struct, subprocess, sys, tempfile, time
 from concurrent.futures import ThreadPoolExecutor

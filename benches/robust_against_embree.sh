@@ -7,15 +7,13 @@
 # faces of a cube; outward one that meets something is wrong, inward one that meets nothing. Needs g++ and libembree-dev (3 or 4).
 set -euo pipefail
 cd "$(dirname "$0")/.."
-config=()
-if [ -f /usr/lib/x86_64-linux-gnu/libshaderc_combined.a ]; then config=(--config scripts/shaderc-debian.toml); fi
-cargo build --release "${config[@]}"
+source benches/built.sh
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 embree=4 flags=()
 if [ -f /usr/include/embree3/rtcore.h ]; then embree=3 flags=(-DE3); fi
 g++ -O3 -march=native -std=c++17 "${flags[@]}" benches/embree_robust.cpp -o "$work/embree_robust" "-lembree$embree"
-target/release/glimt stress "$@" --case leaks --case self-hit --case needles --export "$work/rays" > "$work/own.txt"
+"$GLIMT" stress "$@" --case leaks --case self-hit --case needles --export "$work/rays" > "$work/own.txt"
 cd "$work/rays"
 names=$(ls ./*.rays | sed 's/\.rays$//')
 # shellcheck disable=SC2086
