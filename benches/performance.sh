@@ -167,22 +167,22 @@ def sizes(folder):
 
 def first_ray(folder):
     """Reading and Embree's medium tree against glimt's way to the first ray: the picture is of one pixel, kernels are made beside."""
-    scene, view = ball(f"{folder}/million.glb", 10**6)
+    model, view = ball(f"{folder}/million.glb", 10**6)
     embree, flags = ("3", ["-DE3"]) if os.path.exists("/usr/include/embree3/rtcore.h") else ("4", [])
     program = f"{folder}/embree_bench"
     subprocess.run(["g++", "-O3", "-march=native", "-std=c++17", *flags, f"{BENCH}/embree_bench.cpp", "-o", program, f"-lembree{embree}"], check=True)
-    run("bench", scene, "--view", view, "--runs", 1, "--export", folder)
-    run("render", scene, "--size", "1x1", "--bvh", "fast", "-o", f"{folder}/pixel.png")
+    run("bench", model, "--view", view, "--runs", 1, "--export", folder)
+    run("render", model, "--size", "1x1", "--bvh", "fast", "-o", f"{folder}/pixel.png")
     ours, theirs = [], []
     for _ in range(TURNS):
         start = time.monotonic()
-        with open(scene, "rb") as file:
+        with open(model, "rb") as file:
             file.read()
         read = 1000 * (time.monotonic() - start)
         builds = subprocess.run([program, f"{folder}/million.bin", view], capture_output=True, text=True, check=True,
                                 env=os.environ | {"EMBREE_CFG": "threads=2", "RUNS": "1", "BUILDS": "2"}).stdout
         medium = float(re.search(r"-medium \S+ build ([\d.]+)", builds).group(1))
-        report, _ = run("render", scene, "--size", "1x1", "--bvh", "fast", "-o", f"{folder}/pixel.png")
+        report, _ = run("render", model, "--size", "1x1", "--bvh", "fast", "-o", f"{folder}/pixel.png")
         times = report["times_ms"]
         ours.append(times["total"] - times["render"] - times["save"])
         theirs.append(2 * (read + medium))
@@ -192,7 +192,8 @@ def first_ray(folder):
 ALL = {"threads": threads, "latency": latency, "frame": frame, "memory": memory, "sizes": sizes, "first-ray": first_ray}
 chosen = sys.argv[1:] or list(ALL)
 if unknown := [name for name in chosen if name not in ALL]:
-    sys.exit(f"performance: {', '.join(unknown)}: there are {', '.join(ALL)}")
+    print(f"performance: {', '.join(unknown)}: there are {', '.join(ALL)}", file=sys.stderr)
+    sys.exit(2)
 print("on " + run("devices")[0][0]["driver"])
 for name in chosen:
     print(f"{name}:", flush=True)

@@ -169,8 +169,8 @@ impl Bvh {
     }
 
     /// Checks every invariant: each primitive wholly in one leaf, boxes that hold what is below them, leaf sizes, depth, order
-    /// of nodes, no place in the order of primitives that is no leaf's. Where `triangles` are given, a primitive may instead lie in parts in several leaves, and points all over it
-    /// must be inside their boxes.
+    /// of nodes, no place in the order of primitives that is no leaf's. Where `triangles` are given, a primitive may instead lie
+    /// in parts in several leaves, and points all over it must be inside their boxes.
     ///
     /// # Errors
     /// The first broken invariant, in words.

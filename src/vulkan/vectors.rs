@@ -28,7 +28,7 @@ pub fn prefer_wide_vectors() {
     std::env::set_var(BITS, bits);
 }
 
-/// On Intel's processors with AVX-512 vectors of 256 bits are faster, for whose three ports there are two of 512; what is on Zen 4 was not measured.
+/// On Intel's (Emerald Rapids) 256 bits are mostly faster: they have three ports for such vectors and two for those of 512. Zen 4 was not measured.
 #[cfg(target_arch = "x86_64")]
 fn are_wide_vectors_faster() -> bool {
     let has_avx512 = is_x86_feature_detected!("avx512f")
